@@ -1,0 +1,2 @@
+//! normend
+fn main() {}

@@ -1,0 +1,48 @@
+//! Consistent orientation of point clouds that can be mended: cloud → neighbors → normals → tree → regions → signs.
+//!
+//! The method is Liu et al., *Mendable Consistent Orientation of Point Clouds*. Weights of the Riemannian graph do not
+//! depend on signs, so the multi-source forest of any sources is a subset of one minimum spanning tree: [`SpanningTree`]
+//! is computed once, [`Regions`] are cuts of it, and [`Document`] is the list of sources with its undo history.
+//!
+//! Point ids are the file's order everywhere; only the tree's own arrays are in preorder.
+//!
+//! Not here: files ([`normend_io`](../normend_io)), graphics, windows. This crate opens no file and starts no thread of
+//! its own besides rayon's.
+
+pub mod progress;
+
+pub mod point_cloud;
+
+pub mod neighbors;
+
+pub mod normals;
+
+pub mod riemannian_graph;
+
+pub mod spanning_tree;
+
+pub mod sources;
+
+pub mod orientation;
+
+pub mod regions;
+
+pub mod propagation;
+
+pub mod document;
+
+pub mod metrics;
+
+pub mod shapes;
+
+pub use document::{Document, Edit, EditError};
+pub use neighbors::Neighbors;
+pub use normals::Estimator;
+pub use orientation::{Change, Orientation};
+pub use point_cloud::{PointCloud, PointCloudError};
+pub use progress::{Cancelled, Progress, Silent};
+pub use propagation::{Parameters, Propagation, Stage, Start};
+pub use regions::Regions;
+pub use riemannian_graph::{EdgeRule, RiemannianGraph};
+pub use sources::{Source, Sources};
+pub use spanning_tree::SpanningTree;
