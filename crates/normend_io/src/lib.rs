@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use normend_core::{PointCloud, Progress};
 
 /// The formats that can be read and written.
@@ -94,6 +94,30 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Scan, ReadError> {
 /// [`ReadError`].
 pub fn read_bytes(bytes: Vec<u8>, name: &str, progress: &dyn Progress) -> Result<Scan, ReadError> {
     let _ = (bytes, name, progress);
+    unimplemented!()
+}
+
+/// Positions of a cloud that did not come from a file, in the file's coordinates.
+#[derive(Clone, Copy, Debug)]
+pub enum Positions<'a> {
+    /// Written as `float`.
+    Float(&'a [Vec3]),
+    /// Written as `double`.
+    Double(&'a [DVec3]),
+}
+
+/// Writes a fresh cloud, with `n` unit normals or without, as [`Scan::write`] does: binary little-endian PLY, or text
+/// when the extension says so. A file that is there is replaced.
+///
+/// # Errors
+/// [`WriteError`]; the target is as it was then.
+pub fn write_points(
+    path: &Path,
+    positions: Positions<'_>,
+    normals: Option<&[Vec3]>,
+    progress: &dyn Progress,
+) -> Result<(), WriteError> {
+    let _ = (path, positions, normals, progress);
     unimplemented!()
 }
 
