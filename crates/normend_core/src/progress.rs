@@ -1,6 +1,7 @@
 //! Progress that cancels: every long function takes one and stops when it says so.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The caller asked to stop. The only way the algorithms of this crate fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -50,5 +51,32 @@ impl Progress for Part<'_> {
 
     fn stage(&self, name: &str) {
         self.whole.stage(name);
+    }
+}
+
+/// Counts finished steps from many threads and reports the fraction.
+pub(crate) struct Steps<'a> {
+    progress: &'a dyn Progress,
+    done: AtomicUsize,
+    total: usize,
+}
+
+impl<'a> Steps<'a> {
+    /// Of `total` steps none is done.
+    pub fn new(progress: &'a dyn Progress, total: usize) -> Self {
+        Self {
+            progress,
+            done: AtomicUsize::new(0),
+            total: total.max(1),
+        }
+    }
+
+    /// `count` more steps are done.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the work should stop.
+    pub fn advance(&self, count: usize) -> Result<(), Cancelled> {
+        let done = self.done.fetch_add(count, Ordering::Relaxed) + count;
+        self.progress.report(done as f32 / self.total as f32)
     }
 }

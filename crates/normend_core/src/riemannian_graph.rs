@@ -1,8 +1,10 @@
 //! The Riemannian graph: symmetric union of the k-neighborhoods, with a weight and a sign for each edge.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
-use crate::{Neighbors, PointCloud};
+use crate::progress::Steps;
+use crate::{Cancelled, Neighbors, PointCloud, Progress};
 
 /// How two neighbors' normals are compared across an edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,30 +37,231 @@ impl EdgeRule {
     }
 }
 
+/// One end's view of an undirected edge, 8 bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct HalfEdge {
+    /// The other end.
+    pub neighbor: u32,
+    /// Bits of the weight, which is never negative, with "disagree" in the place of its sign.
+    bits: u32,
+}
+
+const DISAGREE: u32 = 1 << 31;
+
+impl HalfEdge {
+    fn new(neighbor: u32, weight: f32, disagree: bool) -> Self {
+        let sign = if disagree { DISAGREE } else { 0 };
+        // `max` also turns NaN and -0 into 0, so that bits compare as weights do.
+        let weight = if weight > 0.0 { weight } else { 0.0 };
+        Self {
+            neighbor,
+            bits: weight.to_bits() | sign,
+        }
+    }
+
+    /// Bits of the weight; they compare as the weights do.
+    #[inline]
+    pub fn weight_bits(self) -> u32 {
+        self.bits & !DISAGREE
+    }
+
+    /// The weight.
+    #[inline]
+    pub fn weight(self) -> f32 {
+        f32::from_bits(self.weight_bits())
+    }
+
+    /// Whether the normals of the ends disagree.
+    #[inline]
+    pub fn disagree(self) -> bool {
+        self.bits & DISAGREE != 0
+    }
+}
+
 /// An undirected graph over the points; each edge has a weight and says whether its ends' normals disagree.
 ///
-/// Edges are in a total order (weight, smaller id, larger id), which makes the minimum spanning tree unique.
+/// Edges are in a total order (weight, smaller id, larger id), which makes the minimum spanning tree unique. Each edge
+/// is stored once, in the row of one of its ends: 8 bytes an edge and 8 bytes a point.
 #[derive(Clone, Debug)]
 pub struct RiemannianGraph {
-    n_points: usize,
-    // Private representation: chosen by the implementation (directed rows, weights computed once, in parallel).
+    /// `n + 1` offsets into `half_edges`.
+    row_starts: Vec<usize>,
+    half_edges: Vec<HalfEdge>,
 }
 
 impl RiemannianGraph {
     /// The union of the first `k` neighbors of each point, weighted by `rule` on `normals` (`n` unit vectors).
-    pub fn new(cloud: &PointCloud, neighbors: &Neighbors, k: usize, normals: &[Vec3], rule: EdgeRule) -> Self {
-        let _ = (cloud, neighbors, k, normals, rule);
-        unimplemented!()
+    ///
+    /// The weight `1 − |c|` is computed as `|n_i ∓ n_j|² / 2`, which is the same for unit vectors and keeps its precision
+    /// where normals are nearly parallel. O(n k²) time, parallel over points.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when `progress` asks to stop; nothing else.
+    pub fn new(
+        cloud: &PointCloud,
+        neighbors: &Neighbors,
+        k: usize,
+        normals: &[Vec3],
+        rule: EdgeRule,
+        progress: &dyn Progress,
+    ) -> Result<Self, Cancelled> {
+        let n_points = cloud.n_points();
+        let k = k.min(neighbors.k());
+        let row = |point: usize| &neighbors.of(point)[..k];
+        // An edge that both rows hold is stored at the smaller id.
+        let stored = |point: usize, neighbor: u32| {
+            point < neighbor as usize || !row(neighbor as usize).contains(&(point as u32))
+        };
+        let steps = Steps::new(progress, 2 * n_points);
+
+        let mut row_starts = vec![0_usize; n_points + 1];
+        row_starts[1..]
+            .par_chunks_mut(ROWS)
+            .enumerate()
+            .try_for_each(|(chunk, lengths)| {
+                for (i, length) in lengths.iter_mut().enumerate() {
+                    let point = chunk * ROWS + i;
+                    *length = row(point).iter().filter(|&&neighbor| stored(point, neighbor)).count();
+                }
+                steps.advance(lengths.len())
+            })?;
+        for i in 1..row_starts.len() {
+            row_starts[i] += row_starts[i - 1];
+        }
+
+        let mut half_edges = vec![HalfEdge::default(); row_starts[n_points]];
+        let chunks = split_at_rows(&mut half_edges, &row_starts);
+        let positions = cloud.positions();
+        chunks.into_par_iter().try_for_each(|(first, chunk)| {
+            let mut free = chunk.iter_mut();
+            let last = (first + ROWS).min(n_points);
+            for point in first..last {
+                let kept = row(point).iter().filter(|&&neighbor| stored(point, neighbor));
+                // The row comes first in the zip: it must not take a place of the next row when it ends.
+                for (&neighbor, half_edge) in kept.zip(&mut free) {
+                    let other = neighbor as usize;
+                    let agreement = Agreement::between(
+                        rule,
+                        (positions[point], normals[point]),
+                        (positions[other], normals[other]),
+                    );
+                    *half_edge = HalfEdge::new(neighbor, agreement.weight, agreement.disagree);
+                }
+            }
+            steps.advance(last - first)
+        })?;
+        Ok(Self { row_starts, half_edges })
     }
 
     /// A graph from explicit edges `(a, b, weight, disagree)`; for tests and other graphs than neighborhoods.
+    ///
+    /// Ends are less than `n_points`; an edge from a point to itself is left out. A weight that is negative or NaN counts as
+    /// 0. Of several edges between the same two points the lightest counts, among equal ones an agreeing one.
+    ///
+    /// # Panics
+    /// When an end is not less than `n_points`.
     pub fn from_edges(n_points: usize, edges: &[(u32, u32, f32, bool)]) -> Self {
-        let _ = (n_points, edges);
-        unimplemented!()
+        let mut sorted: Vec<(u32, HalfEdge)> = edges
+            .iter()
+            .filter(|(a, b, ..)| a != b)
+            .map(|&(a, b, weight, disagree)| (a.min(b), HalfEdge::new(a.max(b), weight, disagree)))
+            .collect();
+        sorted.par_sort_unstable_by_key(|&(a, edge)| (a, edge.neighbor, edge.weight_bits(), edge.disagree()));
+        sorted.dedup_by_key(|(a, edge)| (*a, edge.neighbor));
+        assert!(
+            sorted.iter().all(|(_, edge)| (edge.neighbor as usize) < n_points),
+            "an edge ends past the last point"
+        );
+        let mut row_starts = vec![0_usize; n_points + 1];
+        for &(a, _) in &sorted {
+            row_starts[a as usize + 1] += 1;
+        }
+        for i in 1..row_starts.len() {
+            row_starts[i] += row_starts[i - 1];
+        }
+        let half_edges = sorted.into_iter().map(|(_, edge)| edge).collect();
+        Self { row_starts, half_edges }
     }
 
     /// Number of points.
     pub fn n_points(&self) -> usize {
-        self.n_points
+        self.row_starts.len() - 1
+    }
+
+    /// Number of undirected edges.
+    pub fn n_edges(&self) -> usize {
+        self.half_edges.len()
+    }
+
+    /// All edges as `(a, b, weight, disagree)`, each once, in no particular order of its ends.
+    pub fn edges(&self) -> impl Iterator<Item = (u32, u32, f32, bool)> {
+        (0..self.n_points()).flat_map(move |point| {
+            let row = self.row(point);
+            row.iter()
+                .map(move |edge| (point as u32, edge.neighbor, edge.weight(), edge.disagree()))
+        })
+    }
+
+    /// The edges stored at `point`: each edge of the graph is in one row only.
+    #[inline]
+    pub(crate) fn row(&self, point: usize) -> &[HalfEdge] {
+        &self.half_edges[self.row_starts[point]..self.row_starts[point + 1]]
+    }
+
+    /// The edge between `a` and `b` as either of them stores it.
+    pub(crate) fn edge(&self, a: u32, b: u32) -> Option<HalfEdge> {
+        let find = |from: u32, to: u32| self.row(from as usize).iter().find(|edge| edge.neighbor == to).copied();
+        find(a, b).or_else(|| find(b, a))
+    }
+}
+
+/// Rows that one task handles at a time.
+const ROWS: usize = 4096;
+
+/// Splits the flat `half_edges` every [`ROWS`] rows; each part comes with the point of its first row.
+fn split_at_rows<'a>(mut half_edges: &'a mut [HalfEdge], row_starts: &[usize]) -> Vec<(usize, &'a mut [HalfEdge])> {
+    let n_points = row_starts.len() - 1;
+    let mut parts = Vec::with_capacity(n_points.div_ceil(ROWS));
+    for first in (0..n_points).step_by(ROWS) {
+        let last = (first + ROWS).min(n_points);
+        let (part, rest) = half_edges.split_at_mut(row_starts[last] - row_starts[first]);
+        parts.push((first, part));
+        half_edges = rest;
+    }
+    parts
+}
+
+/// How two normals of arbitrary sign compare.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Agreement {
+    /// `1 − |c|`, never negative.
+    weight: f32,
+    /// `c < 0`.
+    disagree: bool,
+}
+
+impl Agreement {
+    /// Compares the normals at the ends `(position, normal)` of an edge. Exchanging the ends gives the same.
+    fn between(rule: EdgeRule, a: (Vec3, Vec3), b: (Vec3, Vec3)) -> Self {
+        let (normal_a, normal_b) = (a.1.as_dvec3(), b.1.as_dvec3());
+        let expected = match rule {
+            EdgeRule::Dot => normal_b,
+            EdgeRule::Reflection => {
+                let edge = b.0.as_dvec3() - a.0.as_dvec3();
+                // Two points in one place have no edge direction, and nothing to be mirrored in.
+                let direction = edge.try_normalize().unwrap_or(DVec3::ZERO);
+                normal_b - 2.0 * normal_b.dot(direction) * direction
+            }
+        };
+        let disagree = normal_a.dot(expected) < 0.0;
+        let chord = if disagree {
+            normal_a + expected
+        } else {
+            normal_a - expected
+        };
+        Self {
+            weight: (0.5 * chord.length_squared()) as f32,
+            disagree,
+        }
     }
 }
