@@ -11,6 +11,15 @@ pub enum Origin {
     Picked,
 }
 
+impl Origin {
+    /// The name in lists.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Picked => "Picked",
+        }
+    }
+}
+
 /// A point whose sign somebody vouches for.
 ///
 /// It keeps the vouched *direction*, not a sign: normals are estimated again when parameters change, each with an
@@ -23,6 +32,30 @@ pub struct Source {
     pub normal: Vec3,
     /// Who vouches.
     pub origin: Origin,
+}
+
+impl Source {
+    /// Whether a `stored` unit normal of this point must turn to point to the vouched side: their dot product is
+    /// negative.
+    ///
+    /// A perpendicular direction has no side, so its first component that is not zero decides; opposite directions thus
+    /// always want opposite signs.
+    pub fn turns(&self, stored: Vec3) -> bool {
+        let dot = self.normal.dot(stored);
+        if dot != 0.0 {
+            return dot < 0.0;
+        }
+        let first = self.normal.to_array().into_iter().find(|&component| component != 0.0);
+        first.is_some_and(|component| component < 0.0)
+    }
+
+    /// The same source vouching for the opposite side.
+    pub fn opposite(self) -> Self {
+        Self {
+            normal: -self.normal,
+            ..self
+        }
+    }
 }
 
 /// The sources of a document, by point id, at most one a point.
@@ -47,8 +80,13 @@ impl Sources {
         self.by_point.get(&point)
     }
 
+    /// Whether there is a source at `point`.
+    pub fn contains(&self, point: u32) -> bool {
+        self.by_point.contains_key(&point)
+    }
+
     /// All sources, ascending by point.
-    pub fn iter(&self) -> impl Iterator<Item = &Source> {
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &Source> + DoubleEndedIterator {
         self.by_point.values()
     }
 
@@ -60,5 +98,60 @@ impl Sources {
     /// Takes the source at `point` out.
     pub fn remove(&mut self, point: u32) -> Option<Source> {
         self.by_point.remove(&point)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn source(normal: Vec3) -> Source {
+        Source {
+            point: 3,
+            normal,
+            origin: Origin::Picked,
+        }
+    }
+
+    #[test]
+    fn turns_when_the_stored_normal_points_away() {
+        assert!(!source(Vec3::Z).turns(Vec3::new(0.6, 0.0, 0.8)));
+        assert!(source(Vec3::Z).turns(Vec3::new(0.6, 0.0, -0.8)));
+    }
+
+    #[test]
+    fn opposite_directions_want_opposite_signs_even_across_a_right_angle() {
+        for normal in [
+            Vec3::X,
+            Vec3::Y,
+            -Vec3::Y,
+            Vec3::new(0.0, -0.0, 1.0),
+            Vec3::new(0.6, 0.8, 0.0),
+        ] {
+            for stored in [Vec3::X, Vec3::Y, Vec3::Z] {
+                let source = source(normal);
+                assert_ne!(
+                    source.turns(stored),
+                    source.opposite().turns(stored),
+                    "{normal} on {stored}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn one_source_a_point_ascending() {
+        let mut sources = Sources::default();
+        let at = |point, normal| Source {
+            point,
+            ..source(normal)
+        };
+        assert_eq!(sources.insert(at(7, Vec3::X)), None);
+        assert_eq!(sources.insert(at(2, Vec3::Y)), None);
+        assert_eq!(sources.insert(at(7, Vec3::Z)), Some(at(7, Vec3::X)));
+        assert_eq!(sources.iter().map(|source| source.point).collect::<Vec<_>>(), [2, 7]);
+        assert!(sources.contains(2) && !sources.contains(3));
+        assert_eq!(sources.remove(2), Some(at(2, Vec3::Y)));
+        assert_eq!((sources.len(), sources.is_empty()), (1, false));
     }
 }

@@ -1,56 +1,71 @@
-//! The document: cloud, parameters, sources, and their history. [`Document::apply`] is the only way to change it.
+//! The document: cloud, parameters, sources, and their history. [`Document::apply`] is the only way to change its
+//! sources.
+//!
+//! Ground state are the cloud and the sources; the [`Propagation`] is computed elsewhere and installed, and the signs
+//! follow from both.
+//!
+//! Invariants: with a propagation, each source's point has the sign that the source vouches for; a failed edit changes
+//! nothing; undo restores every bit.
+//! Not here: how signs follow from sources is [`crate::regions`]; jobs and files belong to the editor.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
-use crate::{Change, Orientation, Parameters, PointCloud, Propagation, Source, Sources};
+use crate::sources::Origin;
+use crate::{Change, Orientation, Parameters, PointCloud, Propagation, Regions, Source, Sources};
 
-/// A change of the sources. Small, replayable, its own inverse known when applied.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Edit {
-    /// The click: what the user sees at this point is wrong. The point becomes a source of the opposite sign.
-    Mend(u32),
-    /// Sources are added, or take the place of those at the same points.
-    AddSources(Vec<Source>),
-    /// The sources at these points go.
-    RemoveSources(Vec<u32>),
-    /// The sources at these points change to the opposite direction.
-    FlipSources(Vec<u32>),
-}
+mod edit;
+mod history;
 
-impl Edit {
-    /// In words for menus and the history: "Mend", "Remove source".
-    pub fn label(&self) -> &'static str {
-        unimplemented!()
-    }
-}
+#[cfg(test)]
+mod tests;
 
-/// Why an edit cannot be applied; the document is as it was.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum EditError {
-    /// Nothing is propagated yet.
-    #[error("the orientation is not computed yet")]
-    NotReady,
-    /// A point id past the end of the cloud.
-    #[error("point {point} does not exist: the cloud has {n_points} points")]
-    NoSuchPoint {
-        /// The id.
-        point: u32,
-        /// Number of points.
-        n_points: usize,
-    },
-    /// No source at this point.
-    #[error("point {point} is not a source")]
-    NotASource {
-        /// The id.
-        point: u32,
-    },
-}
+pub use edit::{Edit, EditError};
+use history::{History, SourceChange, Step};
 
 /// A cloud with its sources, and everything derived from them.
+#[derive(Debug)]
 pub struct Document {
     cloud: Arc<PointCloud>,
+    given: Option<Arc<Vec<Vec3>>>,
+    sources: Sources,
+    derived: Option<Derived>,
+    history: History,
+    revision: u64,
+    n_revisions: u64,
+}
+
+/// What follows from the cloud, the parameters and the sources.
+#[derive(Debug)]
+struct Derived {
+    propagation: Propagation,
+    regions: Regions,
+}
+
+impl Derived {
+    /// Brings the regions in line with the sources at some points.
+    fn set(&mut self, sources: impl IntoIterator<Item = (u32, Option<Source>)>) -> Change {
+        let normals = &self.propagation.normals;
+        self.regions.set(
+            sources
+                .into_iter()
+                .map(|(point, source)| (point, source.map(|source| source.turns(normals[point as usize])))),
+        )
+    }
+
+    /// The stored normal of an existing point, turned or not.
+    fn oriented_normal(&self, point: u32) -> Vec3 {
+        let stored = self.propagation.normals[point as usize];
+        let position = self.propagation.tree.position(point);
+        if self.regions.orientation().is_turned(position) {
+            -stored
+        } else {
+            stored
+        }
+    }
 }
 
 impl Document {
@@ -59,8 +74,21 @@ impl Document {
 
     /// A document without orientation yet. `given` are the file's normals by point.
     pub fn new(cloud: Arc<PointCloud>, given: Option<Arc<Vec<Vec3>>>) -> Self {
-        let _ = given;
-        Self { cloud }
+        Self {
+            cloud,
+            given,
+            sources: Sources::default(),
+            derived: None,
+            history: History::new(Self::HISTORY_BYTES),
+            revision: 0,
+            n_revisions: 1,
+        }
+    }
+
+    /// Sets how many bytes the history may take, [`Self::HISTORY_BYTES`] at first. Past it the oldest edits cannot be
+    /// undone any more; the newest always can.
+    pub fn set_history_bytes(&mut self, bytes: usize) {
+        self.history.set_limit(bytes);
     }
 
     /// The points.
@@ -70,37 +98,68 @@ impl Document {
 
     /// The file's normals by point, if it has any.
     pub fn given_normals(&self) -> Option<&Arc<Vec<Vec3>>> {
-        unimplemented!()
+        self.given.as_ref()
     }
 
-    /// Takes a finished propagation in place of the present one; the sources stay and are applied to it.
+    /// Takes a finished propagation in place of the present one; the sources stay and are applied to it, and so does the
+    /// history. O(n).
+    ///
+    /// # Panics
+    /// When the propagation is of another number of points than the cloud.
     pub fn install(&mut self, propagation: Propagation) {
-        let _ = propagation;
-        unimplemented!()
+        assert_eq!(
+            propagation.tree.n_points(),
+            self.cloud.n_points(),
+            "the propagation is of another cloud"
+        );
+        let regions = Regions::new(
+            Arc::clone(&propagation.tree),
+            &propagation.initial_cuts,
+            &propagation.initially_turned,
+        );
+        let derived = self.derived.insert(Derived { propagation, regions });
+        derived.set(self.sources.iter().map(|&source| (source.point, Some(source))));
     }
 
     /// The propagation in force.
     pub fn propagation(&self) -> Option<&Propagation> {
-        unimplemented!()
+        self.derived.as_ref().map(|derived| &derived.propagation)
     }
 
     /// The parameters in force (the default ones before the first [`Self::install`]).
     pub fn parameters(&self) -> Parameters {
-        unimplemented!()
+        self.propagation()
+            .map_or_else(Parameters::default, |propagation| propagation.parameters)
     }
 
     /// The sources, by point.
     pub fn sources(&self) -> &Sources {
-        unimplemented!()
+        &self.sources
     }
 
-    /// Applies an edit, remembers its inverse, forgets what was undone.
+    /// Applies an edit, remembers its inverse, forgets what was undone. Returns what turned.
+    ///
+    /// An edit that leaves every source as it is (adding what is there already) is not remembered. Before the first
+    /// [`Self::install`] sources can be set, but not picked, and nothing turns.
     ///
     /// # Errors
     /// [`EditError`]; the document is unchanged then.
     pub fn apply(&mut self, edit: Edit) -> Result<Change, EditError> {
-        let _ = edit;
-        unimplemented!()
+        let changes = self.changes_of(&edit)?;
+        if changes.is_empty() {
+            return Ok(Change::default());
+        }
+        let after: Vec<_> = changes.iter().map(|change| (change.point, change.after)).collect();
+        let change = self.set_sources(&after);
+        let revision_before = std::mem::replace(&mut self.revision, self.n_revisions);
+        self.n_revisions += 1;
+        self.history.record(Step {
+            edit,
+            changes,
+            revision_before,
+            revision_after: self.revision,
+        });
+        Ok(change)
     }
 
     /// What `Edit::Mend(point)` would turn, without changing anything.
@@ -108,49 +167,148 @@ impl Document {
     /// # Errors
     /// [`EditError`] as [`Self::apply`].
     pub fn preview_mend(&self, point: u32) -> Result<Change, EditError> {
-        let _ = point;
-        unimplemented!()
+        let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
+        self.check_point(point)?;
+        Ok(derived.regions.preview(point))
     }
 
     /// Takes the last edit back; `None` when there is none.
     pub fn undo(&mut self) -> Option<Change> {
-        unimplemented!()
+        let step = self.history.undo()?;
+        self.revision = step.revision_before;
+        // Backwards, because a cut undone in reverse has the region it made.
+        let before: Vec<_> = step
+            .changes
+            .iter()
+            .rev()
+            .map(|change| (change.point, change.before))
+            .collect();
+        Some(self.set_sources(&before))
     }
 
     /// Applies the last undone edit again; `None` when there is none.
     pub fn redo(&mut self) -> Option<Change> {
-        unimplemented!()
+        let step = self.history.redo()?;
+        self.revision = step.revision_after;
+        let after: Vec<_> = step.changes.iter().map(|change| (change.point, change.after)).collect();
+        Some(self.set_sources(&after))
     }
 
     /// The edit that [`Self::undo`] would take back.
     pub fn next_undo(&self) -> Option<&Edit> {
-        unimplemented!()
+        self.history.last_done().map(|step| &step.edit)
     }
 
     /// The edit that [`Self::redo`] would apply.
     pub fn next_redo(&self) -> Option<&Edit> {
-        unimplemented!()
+        self.history.last_undone().map(|step| &step.edit)
     }
 
     /// A number that names the state of the sources: equal numbers, equal sources. Undo returns to the number of
     /// before; so "unsaved" is `revision() != revision_at_last_export`.
     pub fn revision(&self) -> u64 {
-        unimplemented!()
+        self.revision
     }
 
     /// The signs, by preorder position; `None` before the first [`Self::install`].
     pub fn orientation(&self) -> Option<&Orientation> {
-        unimplemented!()
+        self.derived.as_ref().map(|derived| derived.regions.orientation())
     }
 
-    /// The oriented normal of one point.
+    /// The oriented normal of one point; `None` before the first [`Self::install`] or past the end of the cloud.
     pub fn oriented_normal(&self, point: u32) -> Option<Vec3> {
-        let _ = point;
-        unimplemented!()
+        self.check_point(point).ok()?;
+        Some(self.derived.as_ref()?.oriented_normal(point))
     }
 
     /// `n` oriented unit normals by point: O(n), in parallel; for export.
     pub fn oriented_normals(&self) -> Option<Vec<Vec3>> {
-        unimplemented!()
+        let derived = self.derived.as_ref()?;
+        let points = 0..self.cloud.n_points() as u32;
+        Some(
+            points
+                .into_par_iter()
+                .map(|point| derived.oriented_normal(point))
+                .collect(),
+        )
+    }
+
+    fn check_point(&self, point: u32) -> Result<(), EditError> {
+        let n_points = self.cloud.n_points();
+        if (point as usize) < n_points {
+            Ok(())
+        } else {
+            Err(EditError::NoSuchPoint { point, n_points })
+        }
+    }
+
+    /// The source at an existing point.
+    fn source(&self, point: u32) -> Result<Source, EditError> {
+        self.check_point(point)?;
+        self.sources.get(point).copied().ok_or(EditError::NotASource { point })
+    }
+
+    /// What an edit does to the sources, one entry for each point that changes, ascending by point.
+    fn changes_of(&self, edit: &Edit) -> Result<Box<[SourceChange]>, EditError> {
+        let change = |point, after| SourceChange {
+            point,
+            before: self.sources.get(point).copied(),
+            after,
+        };
+        Ok(match edit {
+            &Edit::Mend(point) => {
+                let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
+                self.check_point(point)?;
+                let normal = -derived.oriented_normal(point);
+                Box::new([change(
+                    point,
+                    Some(Source {
+                        point,
+                        normal,
+                        origin: Origin::Picked,
+                    }),
+                )])
+            }
+            Edit::AddSources(sources) => {
+                let mut after = BTreeMap::new();
+                for source in sources {
+                    let point = source.point;
+                    self.check_point(point)?;
+                    if !source.normal.is_finite() || source.normal == Vec3::ZERO {
+                        return Err(EditError::NoDirection { point });
+                    }
+                    after.insert(point, *source);
+                }
+                after.retain(|&point, source| self.sources.get(point) != Some(source));
+                after
+                    .into_iter()
+                    .map(|(point, source)| change(point, Some(source)))
+                    .collect()
+            }
+            Edit::RemoveSources(points) => {
+                points.iter().try_for_each(|&point| self.source(point).map(drop))?;
+                BTreeSet::from_iter(points)
+                    .into_iter()
+                    .map(|&point| change(point, None))
+                    .collect()
+            }
+            Edit::FlipSources(points) => BTreeSet::from_iter(points)
+                .into_iter()
+                .map(|&point| Ok(change(point, Some(self.source(point)?.opposite()))))
+                .collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// Sets the source at each point to what is given and turns what follows from it.
+    fn set_sources(&mut self, sources: &[(u32, Option<Source>)]) -> Change {
+        for &(point, source) in sources {
+            match source {
+                Some(source) => self.sources.insert(source),
+                None => self.sources.remove(point),
+            };
+        }
+        self.derived
+            .as_mut()
+            .map_or_else(Change::default, |derived| derived.set(sources.iter().copied()))
     }
 }

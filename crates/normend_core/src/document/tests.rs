@@ -1,0 +1,369 @@
+use std::collections::BTreeMap;
+
+use fixedbitset::FixedBitSet;
+use glam::DVec3;
+use proptest::prelude::*;
+use proptest::sample::Index;
+
+use super::*;
+use crate::regions::literal::World;
+
+/// Few directions, so that sources are often perpendicular to stored normals.
+fn directions() -> impl Strategy<Value = Vec3> {
+    prop::sample::select(vec![
+        Vec3::X,
+        Vec3::Y,
+        Vec3::Z,
+        -Vec3::X,
+        -Vec3::Z,
+        Vec3::new(0.6, 0.0, 0.8),
+        Vec3::new(-0.6, 0.64, 0.48),
+    ])
+}
+
+fn source(point: u32, normal: Vec3) -> Source {
+    Source {
+        point,
+        normal,
+        origin: Origin::Picked,
+    }
+}
+
+/// A cloud that tells nothing: only the number of points matters here.
+fn document_of(n_points: usize) -> Document {
+    let positions = (0..n_points).map(|point| Vec3::X * point as f32).collect();
+    Document::new(Arc::new(PointCloud::new(DVec3::ZERO, positions).unwrap()), None)
+}
+
+fn propagation_of(world: &World, normals: &[Vec3]) -> Propagation {
+    Propagation {
+        parameters: Parameters::default(),
+        normals: Arc::new(normals.to_vec()),
+        splat_radii: Arc::new(vec![1.0; world.n_points]),
+        tree: Arc::clone(&world.tree),
+        initial_cuts: world.initial_cuts.clone(),
+        initially_turned: world.initially_turned.clone(),
+        seconds: Vec::new(),
+    }
+}
+
+/// What Algorithm 1 makes of the document's sources.
+fn expect(document: &Document, world: &World) -> FixedBitSet {
+    let normals = &document.propagation().unwrap().normals;
+    let sources: BTreeMap<_, _> = document
+        .sources()
+        .iter()
+        .map(|source| (source.point, source.turns(normals[source.point as usize])))
+        .collect();
+    let mut bits = FixedBitSet::with_capacity(world.n_points);
+    for (point, (turned, _)) in world.expect(&sources).into_iter().enumerate() {
+        bits.set(world.tree.position(point as u32) as usize, turned);
+    }
+    bits
+}
+
+#[derive(Clone, Debug)]
+enum Act {
+    Mend(u32),
+    Add(Vec<(u32, Vec3)>),
+    /// Some of the sources, each perhaps twice.
+    Remove(Vec<Index>),
+    Flip(Vec<Index>),
+    Undo,
+    Redo,
+    /// The other world with other normals.
+    Install,
+}
+
+fn acts(n_points: usize) -> impl Strategy<Value = Vec<Act>> {
+    let points = 0..n_points as u32;
+    let some = || prop::collection::vec(any::<Index>(), 0..5);
+    let act = prop_oneof![
+        4 => points.clone().prop_map(Act::Mend),
+        2 => prop::collection::vec((points, directions()), 0..8).prop_map(Act::Add),
+        2 => some().prop_map(Act::Remove),
+        2 => some().prop_map(Act::Flip),
+        4 => Just(Act::Undo),
+        3 => Just(Act::Redo),
+        1 => Just(Act::Install),
+    ];
+    prop::collection::vec(act, 0..40)
+}
+
+/// Two worlds of the same points with normals for each, and what is done in them.
+fn sessions() -> impl Strategy<Value = ([(World, Vec<Vec3>); 2], Vec<Act>)> {
+    (1_usize..25).prop_flat_map(|n_points| {
+        let world = || (World::any(n_points), prop::collection::vec(directions(), n_points));
+        ([world(), world()], acts(n_points))
+    })
+}
+
+/// The edit that an act is, given the present sources.
+fn edit_of(act: &Act, document: &Document) -> Option<Edit> {
+    let sources: Vec<_> = document.sources().iter().map(|source| source.point).collect();
+    let some_of = |chosen: &[Index]| -> Vec<u32> {
+        if sources.is_empty() {
+            Vec::new()
+        } else {
+            chosen.iter().map(|index| *index.get(&sources)).collect()
+        }
+    };
+    match act {
+        Act::Mend(point) => Some(Edit::Mend(*point)),
+        Act::Add(added) => Some(Edit::AddSources(
+            added.iter().map(|&(point, normal)| source(point, normal)).collect(),
+        )),
+        Act::Remove(chosen) => Some(Edit::RemoveSources(some_of(chosen))),
+        Act::Flip(chosen) => Some(Edit::FlipSources(some_of(chosen))),
+        Act::Undo | Act::Redo | Act::Install => None,
+    }
+}
+
+/// The bits of `document`, as if `change` had turned them.
+fn turned(document: &Document, change: &Change) -> FixedBitSet {
+    let mut bits = document.orientation().unwrap().bits().clone();
+    change
+        .ranges()
+        .iter()
+        .for_each(|range| bits.toggle_range(range.start as usize..range.end as usize));
+    bits
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1000))]
+
+    #[test]
+    fn any_session_is_algorithm_1_and_undo_restores_the_state((worlds, acts) in sessions()) {
+        let mut document = document_of(worlds[0].0.n_points);
+        let mut installed = 0;
+        document.install(propagation_of(&worlds[0].0, &worlds[0].1));
+        // Sources and revision after each edit that can be undone or redone, and which of these states holds.
+        let mut states = vec![(document.sources().clone(), document.revision())];
+        let mut present = 0;
+        for act in acts {
+            let before = document.orientation().unwrap().bits().clone();
+            let mut change = Change::default();
+            match (edit_of(&act, &document), &act) {
+                (Some(edit), _) => {
+                    let preview = match edit {
+                        Edit::Mend(point) => Some(document.preview_mend(point).unwrap()),
+                        _ => None,
+                    };
+                    change = document.apply(edit).unwrap();
+                    prop_assert!(preview.is_none_or(|preview| preview == change && !change.is_empty()));
+                    if document.sources() == &states[present].0 {
+                        prop_assert!(change.is_empty());
+                    } else {
+                        states.truncate(present + 1);
+                        prop_assert!(states.iter().all(|(_, revision)| *revision != document.revision()));
+                        states.push((document.sources().clone(), document.revision()));
+                        present += 1;
+                    }
+                }
+                (None, Act::Undo) => {
+                    let undone = document.undo();
+                    prop_assert_eq!(undone.is_some(), present > 0);
+                    change = undone.unwrap_or_default();
+                    present = present.saturating_sub(1);
+                }
+                (None, Act::Redo) => {
+                    let redone = document.redo();
+                    prop_assert_eq!(redone.is_some(), present + 1 < states.len());
+                    change = redone.unwrap_or_default();
+                    present = (present + 1).min(states.len() - 1);
+                }
+                (None, _) => {
+                    installed = 1 - installed;
+                    document.install(propagation_of(&worlds[installed].0, &worlds[installed].1));
+                }
+            }
+            if !matches!(act, Act::Install) {
+                prop_assert_eq!(turned(&document, &change), before);
+            }
+            prop_assert_eq!((document.sources(), document.revision()), (&states[present].0, states[present].1));
+            prop_assert_eq!(document.next_undo().is_some(), present > 0);
+            prop_assert_eq!(document.next_redo().is_some(), present + 1 < states.len());
+            prop_assert_eq!(document.orientation().unwrap().bits(), &expect(&document, &worlds[installed].0));
+            for source in document.sources().iter() {
+                let shown = document.oriented_normal(source.point).unwrap();
+                prop_assert!(!source.turns(shown) || source.normal.dot(shown) == 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn undoing_all_restores_every_bit_and_redoing_all_too((worlds, acts) in sessions()) {
+        let mut document = document_of(worlds[0].0.n_points);
+        document.install(propagation_of(&worlds[0].0, &worlds[0].1));
+        let mut bits = vec![document.orientation().unwrap().clone()];
+        for act in acts {
+            if let Some(edit) = edit_of(&act, &document) {
+                let revision = document.revision();
+                document.apply(edit).unwrap();
+                if document.revision() != revision {
+                    bits.push(document.orientation().unwrap().clone());
+                }
+            }
+        }
+        for expect in bits.iter().rev().skip(1) {
+            prop_assert!(document.undo().is_some());
+            prop_assert_eq!(document.orientation().unwrap(), expect);
+        }
+        prop_assert!(document.undo().is_none());
+        for expect in bits.iter().skip(1) {
+            prop_assert!(document.redo().is_some());
+            prop_assert_eq!(document.orientation().unwrap(), expect);
+        }
+        prop_assert!(document.redo().is_none());
+    }
+}
+
+/// Five points in a row, all normals up, ready to be mended.
+fn row() -> Document {
+    let edges: Vec<_> = (0..4).map(|a| (a, a + 1, 0.1, false)).collect();
+    let world = World::without_cuts(5, edges);
+    let mut document = document_of(5);
+    document.install(propagation_of(&world, &[Vec3::Z; 5]));
+    document
+}
+
+#[test]
+fn a_mended_point_is_a_source_of_the_opposite_direction() {
+    let mut document = row();
+    assert_eq!(document.apply(Edit::Mend(1)).unwrap().n_points(), 5);
+    assert_eq!(document.sources().get(1), Some(&source(1, -Vec3::Z)));
+    assert_eq!(document.oriented_normals().unwrap(), [-Vec3::Z; 5]);
+    document.apply(Edit::Mend(1)).unwrap();
+    assert_eq!(document.sources().iter().collect::<Vec<_>>(), [&source(1, Vec3::Z)]);
+    assert_eq!(document.oriented_normal(4), Some(Vec3::Z));
+    assert_eq!(document.oriented_normal(5), None);
+}
+
+#[test]
+fn a_failed_edit_changes_nothing() {
+    let no_such_point = EditError::NoSuchPoint { point: 5, n_points: 5 };
+    check(Edit::Mend(5), no_such_point.clone());
+    check(
+        Edit::AddSources(vec![source(0, Vec3::X), source(5, Vec3::Z)]),
+        no_such_point.clone(),
+    );
+    check(
+        Edit::AddSources(vec![source(0, Vec3::X), source(1, Vec3::ZERO)]),
+        EditError::NoDirection { point: 1 },
+    );
+    check(
+        Edit::AddSources(vec![source(2, Vec3::NAN)]),
+        EditError::NoDirection { point: 2 },
+    );
+    check(Edit::RemoveSources(vec![3, 2]), EditError::NotASource { point: 2 });
+    check(Edit::RemoveSources(vec![3, 5]), no_such_point.clone());
+    check(Edit::FlipSources(vec![3, 0]), EditError::NotASource { point: 0 });
+    check(
+        Edit::FlipSources(vec![3, u32::MAX]),
+        EditError::NoSuchPoint {
+            point: u32::MAX,
+            n_points: 5,
+        },
+    );
+
+    fn check(edit: Edit, expect: EditError) {
+        let mut document = row();
+        document.apply(Edit::Mend(3)).unwrap();
+        document.apply(Edit::Mend(4)).unwrap();
+        document.undo();
+        let state = |document: &Document| {
+            let edits = (document.next_undo().cloned(), document.next_redo().cloned());
+            (
+                document.sources().clone(),
+                document.revision(),
+                edits,
+                document.orientation().cloned(),
+            )
+        };
+        let before = state(&document);
+        assert_eq!(document.apply(edit), Err(expect));
+        assert_eq!(state(&document), before);
+    }
+}
+
+#[test]
+fn an_edit_that_changes_no_source_is_not_remembered() {
+    let mut document = row();
+    document.apply(Edit::Mend(1)).unwrap();
+    document.apply(Edit::Mend(3)).unwrap();
+    document.undo();
+    let revision = document.revision();
+    for edit in [
+        Edit::AddSources(vec![source(1, -Vec3::Z)]),
+        Edit::AddSources(vec![source(1, Vec3::X), source(1, -Vec3::Z)]),
+        Edit::AddSources(Vec::new()),
+        Edit::RemoveSources(Vec::new()),
+        Edit::FlipSources(Vec::new()),
+    ] {
+        assert!(document.apply(edit).unwrap().is_empty());
+    }
+    assert_eq!(
+        (document.next_undo(), document.next_redo()),
+        (Some(&Edit::Mend(1)), Some(&Edit::Mend(3)))
+    );
+    assert_eq!(document.revision(), revision);
+}
+
+#[test]
+fn points_that_stand_in_a_list_twice_count_once() {
+    let mut document = row();
+    document
+        .apply(Edit::AddSources(vec![source(1, Vec3::Z), source(1, -Vec3::Z)]))
+        .unwrap();
+    assert_eq!(document.sources().get(1), Some(&source(1, -Vec3::Z)));
+    document.apply(Edit::FlipSources(vec![1, 1])).unwrap();
+    assert_eq!(document.sources().get(1), Some(&source(1, Vec3::Z)));
+    document.apply(Edit::RemoveSources(vec![1, 1])).unwrap();
+    assert!(document.sources().is_empty());
+}
+
+#[test]
+fn before_the_first_propagation_sources_wait() {
+    let mut document = document_of(5);
+    assert_eq!(document.apply(Edit::Mend(1)), Err(EditError::NotReady));
+    assert_eq!(document.preview_mend(1), Err(EditError::NotReady));
+    assert_eq!(document.oriented_normals(), None);
+    assert!(
+        document
+            .apply(Edit::AddSources(vec![source(2, -Vec3::Z)]))
+            .unwrap()
+            .is_empty()
+    );
+    document.install(row().propagation().unwrap().clone());
+    assert_eq!(document.oriented_normal(0), Some(-Vec3::Z));
+    assert_eq!(document.undo().unwrap().n_points(), 5);
+}
+
+#[test]
+fn a_source_keeps_its_direction_when_stored_normals_change() {
+    let mut document = row();
+    document.apply(Edit::Mend(1)).unwrap();
+    document.apply(Edit::Mend(4)).unwrap();
+    let mut other = row().propagation().unwrap().clone();
+    other.normals = Arc::new(vec![-Vec3::Z; 5]);
+    document.install(other);
+    assert_eq!(document.oriented_normal(1), Some(-Vec3::Z));
+    assert_eq!(document.oriented_normal(4), Some(Vec3::Z));
+    document.undo();
+    assert_eq!(document.oriented_normals().unwrap(), [-Vec3::Z; 5]);
+}
+
+#[test]
+fn the_history_forgets_the_oldest_edits_first() {
+    let mut document = row();
+    document.apply(Edit::Mend(0)).unwrap();
+    document.apply(Edit::Mend(1)).unwrap();
+    document.set_history_bytes(0);
+    document.apply(Edit::Mend(2)).unwrap();
+    let kept = document.revision();
+    assert!(document.undo().is_some());
+    assert!(document.undo().is_none());
+    assert_eq!(document.sources().len(), 2);
+    assert!(document.redo().is_some());
+    assert_eq!(document.revision(), kept);
+}

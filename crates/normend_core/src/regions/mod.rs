@@ -1,0 +1,289 @@
+//! The regions of the spanning tree that each source orients: MMST (Liu et al., Algorithm 1) as cuts of one tree.
+//!
+//! Weights do not depend on signs, so the forest that signs spread along from any sources is a subset of the one
+//! [`SpanningTree`] (contracting the sources keeps the cycle property). What is left to know is where it is cut.
+//! A *base region* is a component of the tree without its initial cuts. Without a vouched source it has its default sign;
+//! with some, it is cut at the heaviest edge between each two of them, and each part takes the sign of its source.
+//! So a new source cuts one edge, a removed one merges its region over the lightest edge that separates it from another
+//! source's, and a changed sign cuts nothing.
+//!
+//! Invariants: a region is known by its top, the position whose parent edge is cut, or a root; it is the top's subtree
+//! without the subtrees of the tops in it; it holds at most one source, and where its base region has a source, exactly one. The
+//! bits of a region agree with phi, so one bit tells all of them. Initial cuts are never merged over.
+//! Equal weights are ordered by point id, so the regions depend on the set of sources alone, not on its history.
+//!
+//! Not here: directions of sources and undo, see [`crate::document`].
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use fixedbitset::FixedBitSet;
+
+use crate::{Change, Orientation, SpanningTree};
+
+mod position_set;
+
+#[cfg(test)]
+pub(crate) mod literal;
+#[cfg(test)]
+mod tests;
+
+use position_set::PositionSet;
+
+/// Which source orients which point of a spanning tree, and the signs that follow from it.
+///
+/// Sources are given by point id, with the sign they vouch for: whether the stored normal must turn. An operation
+/// climbs the tree (its depth is some thousands at millions of points) and passes over the cuts of the regions it
+/// changes; there is no pass over points but the word-wise flip of the turned ranges. Memory is half a byte a point.
+#[derive(Clone, Debug)]
+pub struct Regions {
+    tree: Arc<SpanningTree>,
+    /// Roots and initial cuts.
+    initial_tops: FixedBitSet,
+    initially_turned: FixedBitSet,
+    /// The tops of all regions: [`Self::initial_tops`] and the cuts between sources.
+    tops: PositionSet,
+    /// The position of the source of each region that has one, by the region's top.
+    source_by_top: BTreeMap<u32, u32>,
+    orientation: Orientation,
+}
+
+/// What a source at some position orients, given the sources that are there.
+enum Part {
+    /// The whole region of this top: it has no source, or the source is at this very position.
+    Whole { top: u32 },
+    /// What a new cut separates from the region's top.
+    Below { cut: u32 },
+    /// What a new cut leaves to the region's top; the old source keeps the other side.
+    Above { top: u32, cut: u32, old: u32 },
+}
+
+impl Regions {
+    /// The base regions of `tree` with their default signs, without a vouched source. O(n).
+    ///
+    /// `initial_cuts` and `initially_turned` are by position, as in [`crate::Propagation`]: the parent edges of the set
+    /// positions are cut, and the stored normals at the tops of base regions start turned where
+    /// `initially_turned` is set.
+    pub fn new(tree: Arc<SpanningTree>, initial_cuts: &FixedBitSet, initially_turned: &FixedBitSet) -> Self {
+        let n_points = tree.n_points();
+        let mut initial_tops = FixedBitSet::with_capacity(n_points);
+        let mut tops = PositionSet::new(n_points);
+        let mut turned = FixedBitSet::with_capacity(n_points);
+        for position in 0..n_points as u32 {
+            let index = position as usize;
+            match tree.parent(position) {
+                Some(parent) if !initial_cuts.contains(index) => {
+                    let turns = tree.phi(parent) != tree.phi(position);
+                    turned.set(index, turned.contains(parent as usize) != turns);
+                }
+                _ => {
+                    initial_tops.insert(index);
+                    tops.insert(position);
+                    turned.set(index, initially_turned.contains(index));
+                }
+            }
+        }
+        Self {
+            tree,
+            initial_tops,
+            initially_turned: initially_turned.clone(),
+            tops,
+            source_by_top: BTreeMap::new(),
+            orientation: Orientation::new(turned),
+        }
+    }
+
+    /// The signs that the sources give.
+    pub fn orientation(&self) -> &Orientation {
+        &self.orientation
+    }
+
+    /// Number of sources.
+    pub fn n_sources(&self) -> usize {
+        self.source_by_top.len()
+    }
+
+    /// The source that orients `point`; `None` where the default sign holds.
+    pub fn source_of(&self, point: u32) -> Option<u32> {
+        let top = self.top_of(self.tree.position(point));
+        self.source_by_top
+            .get(&top)
+            .map(|&source| self.tree.order()[source as usize])
+    }
+
+    /// Makes `point` a source whose stored normal is turned or not, or changes the sign of the source it is.
+    pub fn add(&mut self, point: u32, turned: bool) -> Change {
+        self.set([(point, Some(turned))])
+    }
+
+    /// Takes the source at `point` away; nothing happens when there is none.
+    pub fn remove(&mut self, point: u32) -> Change {
+        self.set([(point, None)])
+    }
+
+    /// Makes each point a source of a sign (`Some(turned)`) or no source (`None`); the result is the same as one by one,
+    /// and for sources alone the order does not matter.
+    ///
+    /// Regions flip once, in the end, so a batch costs little more than finding its cuts.
+    pub fn set(&mut self, sources: impl IntoIterator<Item = (u32, Option<bool>)>) -> Change {
+        let mut flips = Vec::new();
+        let mut wanted = BTreeMap::new();
+        for (point, turned) in sources {
+            let position = self.tree.position(point);
+            match turned {
+                Some(turned) => {
+                    self.admit(position);
+                    wanted.insert(position, turned);
+                }
+                None => {
+                    self.dismiss(position, &mut flips);
+                    wanted.remove(&position);
+                }
+            }
+        }
+        for (position, turned) in wanted {
+            if self.orientation.is_turned(position) != turned {
+                self.flip(self.top_of(position), &mut flips);
+            }
+        }
+        Change::from_flips(&flips)
+    }
+
+    /// What [`Self::add`] with the sign that `point` does not have now would turn, without changing anything.
+    pub fn preview(&self, point: u32) -> Change {
+        let ranges: Vec<_> = match self.part(self.tree.position(point)) {
+            Part::Whole { top } => self.own_ranges(top, None).collect(),
+            Part::Below { cut } => self.own_ranges(cut, None).collect(),
+            Part::Above { top, cut, .. } => self.own_ranges(top, Some(cut)).collect(),
+        };
+        Change::from_flips(&ranges)
+    }
+
+    /// The top of the region of `position`: its nearest ancestor, or itself, that is a top.
+    fn top_of(&self, mut position: u32) -> u32 {
+        while !self.tops.contains(position)
+            && let Some(parent) = self.tree.parent(position)
+        {
+            position = parent;
+        }
+        position
+    }
+
+    /// What a source at `position` orients.
+    fn part(&self, position: u32) -> Part {
+        let top = self.top_of(position);
+        match self.source_by_top.get(&top) {
+            Some(&old) if old != position => {
+                let (cut, is_above_old) = self.heaviest_edge(position, old);
+                if is_above_old {
+                    Part::Above { top, cut, old }
+                } else {
+                    Part::Below { cut }
+                }
+            }
+            _ => Part::Whole { top },
+        }
+    }
+
+    /// The heaviest edge on the path between two different positions `a` and `b` of one region, as the position whose
+    /// parent edge it is, and whether it is on the way up from `b`.
+    fn heaviest_edge(&self, mut a: u32, mut b: u32) -> (u32, bool) {
+        let mut heaviest = (a.max(b), b > a);
+        // In preorder an ancestor comes first, so the later one of two is never an ancestor of the other.
+        while a != b {
+            let is_from_b = b > a;
+            let climber = if is_from_b { &mut b } else { &mut a };
+            if self.tree.compare_edges(*climber, heaviest.0).is_gt() {
+                heaviest = (*climber, is_from_b);
+            }
+            let Some(parent) = self.tree.parent(*climber) else {
+                break;
+            };
+            *climber = parent;
+        }
+        heaviest
+    }
+
+    /// Makes `position` a source: one cut at most, no sign changes.
+    fn admit(&mut self, position: u32) {
+        match self.part(position) {
+            Part::Whole { top } => {
+                self.source_by_top.insert(top, position);
+            }
+            Part::Below { cut } => {
+                self.tops.insert(cut);
+                self.source_by_top.insert(cut, position);
+            }
+            Part::Above { top, cut, old } => {
+                self.tops.insert(cut);
+                self.source_by_top.insert(cut, old);
+                self.source_by_top.insert(top, position);
+            }
+        }
+    }
+
+    /// Takes the source at `position` away, if it is one; its region joins the neighbor over the lightest cut and takes its
+    /// signs, or takes the default sign when the base region has no other source.
+    fn dismiss(&mut self, position: u32, flips: &mut Vec<Range<u32>>) {
+        let top = self.top_of(position);
+        if self.source_by_top.get(&top) != Some(&position) {
+            return;
+        }
+        self.source_by_top.remove(&top);
+        let lightest = std::iter::once(top)
+            .chain(self.nested_tops(top, None))
+            .filter(|&cut| !self.initial_tops.contains(cut as usize))
+            .min_by(|&a, &b| self.tree.compare_edges(a, b));
+        // A cut between sources is no root, so it has a parent.
+        let Some((cut, parent)) = lightest.and_then(|cut| Some((cut, self.tree.parent(cut)?))) else {
+            if self.orientation.is_turned(top) != self.initially_turned.contains(top as usize) {
+                self.flip(top, flips);
+            }
+            return;
+        };
+        let turns = self.tree.phi(cut) != self.tree.phi(parent);
+        if (self.orientation.is_turned(cut) != self.orientation.is_turned(parent)) != turns {
+            self.flip(top, flips);
+        }
+        self.tops.remove(cut);
+        if cut != top
+            && let Some(neighbor) = self.source_by_top.remove(&cut)
+        {
+            self.source_by_top.insert(top, neighbor);
+        }
+    }
+
+    /// Flips the region of `top` and remembers its ranges.
+    fn flip(&mut self, top: u32, flips: &mut Vec<Range<u32>>) {
+        let n_before = flips.len();
+        flips.extend(self.own_ranges(top, None));
+        for range in &flips[n_before..] {
+            self.orientation.flip(range.clone());
+        }
+    }
+
+    /// The ranges of positions of the region of `top`, ascending, as if there were one more top `extra` in it.
+    fn own_ranges(&self, top: u32, extra: Option<u32>) -> impl Iterator<Item = Range<u32>> {
+        let end = self.tree.subtree(top).end;
+        let mut start = top;
+        self.nested_tops(top, extra)
+            .map(|nested| self.tree.subtree(nested))
+            .chain(std::iter::once(end..end))
+            .map(move |nested| std::mem::replace(&mut start, nested.end)..nested.start)
+            .filter(|range| !range.is_empty())
+    }
+
+    /// The tops that bound the region of `top` below, ascending, as if there were one more top `extra` in it; those
+    /// further down are jumped over.
+    fn nested_tops(&self, top: u32, extra: Option<u32>) -> impl Iterator<Item = u32> {
+        let end = self.tree.subtree(top).end;
+        let mut from = top + 1;
+        std::iter::from_fn(move || {
+            let extra = extra.filter(|&extra| extra >= from);
+            let nested = self.tops.next(from).into_iter().chain(extra).min()?;
+            from = self.tree.subtree(nested).end;
+            (nested < end).then_some(nested)
+        })
+    }
+}

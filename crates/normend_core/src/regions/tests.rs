@@ -1,0 +1,146 @@
+use proptest::prelude::*;
+
+use super::literal::World;
+use super::*;
+
+/// What `regions` say, by point: whether the stored normal is turned, and the source that says so.
+fn say(regions: &Regions) -> Vec<(bool, Option<u32>)> {
+    (0..regions.tree.n_points() as u32)
+        .map(|point| {
+            (
+                regions.orientation().is_turned(regions.tree.position(point)),
+                regions.source_of(point),
+            )
+        })
+        .collect()
+}
+
+/// The change between two orientations.
+fn difference(before: &Orientation, after: &Orientation) -> Change {
+    let turned: Vec<_> = before
+        .bits()
+        .symmetric_difference(after.bits())
+        .map(|position| position as u32..position as u32 + 1)
+        .collect();
+    Change::from_flips(&turned)
+}
+
+fn regions_of(world: &World) -> Regions {
+    Regions::new(Arc::clone(&world.tree), &world.initial_cuts, &world.initially_turned)
+}
+
+/// A world and edits of its sources, in batches.
+fn worlds_and_batches() -> impl Strategy<Value = (World, Vec<Vec<(u32, Option<bool>)>>)> {
+    (1_usize..40).prop_flat_map(|n_points| {
+        let edit = (
+            0..n_points as u32,
+            prop_oneof![3 => any::<bool>().prop_map(Some), 2 => Just(None)],
+        );
+        let batches = prop_oneof![
+            prop::collection::vec(prop::collection::vec(edit.clone(), 1), 0..30),
+            prop::collection::vec(prop::collection::vec(edit, 0..30), 0..6),
+        ];
+        (World::any(n_points), batches)
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1000))]
+
+    #[test]
+    fn batches_are_the_same_as_one_by_one_as_at_once_and_as_algorithm_1((world, batches) in worlds_and_batches()) {
+        let mut batched = regions_of(&world);
+        let mut one_by_one = batched.clone();
+        let mut sources = BTreeMap::new();
+        prop_assert_eq!(say(&batched), world.expect(&sources));
+        for batch in batches {
+            let before = batched.orientation().clone();
+            let change = batched.set(batch.iter().copied());
+            prop_assert_eq!(change, difference(&before, batched.orientation()));
+            for (point, turned) in batch {
+                let before = one_by_one.orientation().clone();
+                let change = match turned {
+                    Some(turned) => one_by_one.add(point, turned),
+                    None => one_by_one.remove(point),
+                };
+                prop_assert_eq!(change, difference(&before, one_by_one.orientation()));
+                match turned {
+                    Some(turned) => sources.insert(point, turned),
+                    None => sources.remove(&point),
+                };
+            }
+            let expect = world.expect(&sources);
+            prop_assert_eq!(&say(&batched), &expect);
+            prop_assert_eq!(&say(&one_by_one), &expect);
+            prop_assert_eq!(batched.n_sources(), sources.len());
+
+            let mut at_once = regions_of(&world);
+            at_once.set(sources.iter().map(|(&point, &turned)| (point, Some(turned))));
+            prop_assert_eq!(&say(&at_once), &expect);
+        }
+    }
+
+    #[test]
+    fn preview_is_what_adding_turns((world, batches) in worlds_and_batches()) {
+        let mut regions = regions_of(&world);
+        for batch in batches {
+            regions.set(batch);
+            for point in 0..world.n_points as u32 {
+                let turned = regions.orientation().is_turned(world.tree.position(point));
+                let preview = regions.preview(point);
+                let mut clicked = regions.clone();
+                prop_assert_eq!(&clicked.add(point, !turned), &preview);
+                prop_assert!(preview.n_points() > 0);
+            }
+        }
+    }
+
+    #[test]
+    fn removing_in_any_order_leads_back((world, batches) in worlds_and_batches()) {
+        let mut regions = regions_of(&world);
+        let start = say(&regions);
+        batches.into_iter().for_each(|batch| drop(regions.set(batch)));
+        regions.set((0..world.n_points as u32).map(|point| (point, None)));
+        prop_assert_eq!(say(&regions), start);
+        prop_assert_eq!(regions.n_sources(), 0);
+    }
+}
+
+/// A path 0 – 1 – … with the given weights of its edges, all normals agreeing.
+fn path(weights: &[f32]) -> Regions {
+    let edges: Vec<_> = weights
+        .iter()
+        .zip(0_u32..)
+        .map(|(&weight, a)| (a, a + 1, weight, false))
+        .collect();
+    regions_of(&World::without_cuts(weights.len() + 1, edges))
+}
+
+#[test]
+fn a_region_without_a_source_flips_whole_and_one_with_a_source_splits_at_the_heaviest_edge() {
+    let mut regions = path(&[0.1, 0.3, 0.2]);
+    assert_eq!(regions.add(0, true).n_points(), 4);
+    assert_eq!(regions.add(3, false).n_points(), 2);
+    assert_eq!(
+        say(&regions),
+        [(true, Some(0)), (true, Some(0)), (false, Some(3)), (false, Some(3))]
+    );
+    assert_eq!(regions.remove(0).n_points(), 2);
+    assert_eq!(say(&regions), [(false, Some(3)); 4]);
+    assert!(regions.remove(0).is_empty(), "there is no source any more");
+    assert!(regions.remove(3).is_empty(), "the default is not turned either");
+}
+
+#[test]
+fn of_equal_edges_the_one_with_the_larger_ids_is_cut() {
+    let mut regions = path(&[0.5, 0.5, 0.5]);
+    regions.add(0, true);
+    assert_eq!(regions.add(3, false).n_points(), 1);
+    assert_eq!(regions.preview(1).n_points(), 2);
+}
+
+#[test]
+fn no_points_have_no_regions() {
+    let regions = regions_of(&World::without_cuts(0, Vec::new()));
+    assert_eq!(regions.orientation().n_points(), 0);
+}
