@@ -1,11 +1,18 @@
 //! From cloud and parameters to the tree that signs travel along: everything slow, once, in a job.
 
+mod given;
+mod splat_radii;
+
+use std::ops::RangeInclusive;
 use std::sync::Arc;
+use std::time::Instant;
 
 use fixedbitset::FixedBitSet;
 use glam::Vec3;
 
-use crate::{Cancelled, EdgeRule, Estimator, PointCloud, Progress, SpanningTree};
+use self::given::GivenNormals;
+use crate::progress::Part;
+use crate::{Cancelled, EdgeRule, Estimator, Neighbors, PointCloud, Progress, RiemannianGraph, SpanningTree, normals};
 
 /// Which normals and signs a document starts from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -51,6 +58,14 @@ pub struct Parameters {
     pub edge_rule: EdgeRule,
     /// Estimated or given normals.
     pub start: Start,
+}
+
+impl Parameters {
+    /// What [`Self::k_normals`] can be; a value outside counts as the nearest one inside.
+    pub const K_NORMALS: RangeInclusive<usize> = 3..=200;
+
+    /// What [`Self::k_graph`] can be; a value outside counts as the nearest one inside.
+    pub const K_GRAPH: RangeInclusive<usize> = 1..=200;
 }
 
 impl Default for Parameters {
@@ -123,7 +138,99 @@ impl Propagation {
         parameters: Parameters,
         progress: &dyn Progress,
     ) -> Result<Self, Cancelled> {
-        let _ = (cloud, given, parameters, progress);
-        unimplemented!()
+        let k_normals = clamp(parameters.k_normals, Parameters::K_NORMALS);
+        let k_graph = clamp(parameters.k_graph, Parameters::K_GRAPH);
+        let given = given.filter(|_| parameters.start == Start::Keep).map(GivenNormals::new);
+        let mut clock = Clock::start();
+
+        progress.stage("Finding neighbors");
+        let part = Part::new(progress, 0.0..0.35);
+        let k = k_normals.max(k_graph).max(splat_radii::K);
+        let neighbors = Neighbors::find(cloud, k, &part)?;
+        let splat_radii = splat_radii::splat_radii(cloud, &neighbors);
+        clock.finish(Stage::Neighbors);
+
+        progress.stage("Estimating normals");
+        let part = Part::new(progress, 0.35..0.75);
+        let estimate = || normals::estimate(cloud, &neighbors, k_normals, parameters.estimator, &part);
+        let normals = match &given {
+            Some(given) if given.missing.is_clear() => given.normals.clone(),
+            Some(given) => given.filled_with(&estimate()?),
+            None => estimate()?,
+        };
+        clock.finish(Stage::Normals);
+
+        progress.stage("Building the graph");
+        let part = Part::new(progress, 0.75..0.8);
+        let graph = RiemannianGraph::new(cloud, &neighbors, k_graph, &normals, parameters.edge_rule, &part)?;
+        drop(neighbors);
+        clock.finish(Stage::Graph);
+
+        progress.stage("Growing the spanning tree");
+        let tree = SpanningTree::new(&graph, &Part::new(progress, 0.8..1.0))?;
+        drop(graph);
+        let mut initially_turned = FixedBitSet::with_capacity(tree.n_points());
+        for &root in tree.roots() {
+            initially_turned.set(root as usize, turn_upward(cloud, &normals, &tree, root));
+        }
+        let mut initial_cuts = FixedBitSet::with_capacity(tree.n_points());
+        if let Some(given) = &given {
+            given.cut_disagreements(&tree, &mut initial_cuts, &mut initially_turned);
+        }
+        clock.finish(Stage::Tree);
+
+        Ok(Self {
+            parameters,
+            normals: Arc::new(normals),
+            splat_radii: Arc::new(splat_radii),
+            tree: Arc::new(tree),
+            initial_cuts,
+            initially_turned,
+            seconds: clock.seconds,
+        })
     }
 }
+
+/// Whether the normal at `root` turns so that the default source of its component points up: the point farthest along
+/// +z, of several the one with the smallest id.
+fn turn_upward(cloud: &PointCloud, normals: &[Vec3], tree: &SpanningTree, root: u32) -> bool {
+    let height = |point: u32| cloud.positions()[point as usize].z;
+    let mut top = root;
+    for position in tree.subtree(root) {
+        let (point, highest) = (tree.order()[position as usize], tree.order()[top as usize]);
+        if height(point) > height(highest) || (height(point) == height(highest) && point < highest) {
+            top = position;
+        }
+    }
+    let normal = normals[tree.order()[top as usize] as usize];
+    // A level normal turns toward +y, then +x: its estimated sign is arbitrary and must not show.
+    let points_down = (normal.z, normal.y, normal.x) < (0.0, 0.0, 0.0);
+    points_down ^ tree.phi(top)
+}
+
+fn clamp(k: usize, range: RangeInclusive<usize>) -> usize {
+    k.clamp(*range.start(), *range.end())
+}
+
+/// Measures one stage after the other.
+struct Clock {
+    begin: Instant,
+    seconds: Vec<(Stage, f64)>,
+}
+
+impl Clock {
+    fn start() -> Self {
+        Self {
+            begin: Instant::now(),
+            seconds: Vec::new(),
+        }
+    }
+
+    fn finish(&mut self, stage: Stage) {
+        self.seconds.push((stage, self.begin.elapsed().as_secs_f64()));
+        self.begin = Instant::now();
+    }
+}
+
+#[cfg(test)]
+mod tests;

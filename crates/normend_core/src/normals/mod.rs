@@ -1,7 +1,21 @@
 //! Unit normals of arbitrary sign from k-neighborhoods.
+//!
+//! Neighborhoods without a plane still get a unit normal: one perpendicular to the line of collinear points, +z for
+//! points in one place.
 
-use glam::Vec3;
+mod eigen;
+mod obne;
+mod pca;
+mod wpca;
 
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+pub use obne::obne;
+pub use pca::pca;
+pub use wpca::wpca;
+
+use crate::progress::{Part, Steps};
 use crate::{Cancelled, Neighbors, PointCloud, Progress};
 
 /// How a normal is fitted to a neighborhood.
@@ -41,7 +55,8 @@ impl Estimator {
 
 /// Estimates one unit normal per point from the `k` nearest of each row of `neighbors`.
 ///
-/// Returns `n` unit vectors in the order of the cloud; each sign is arbitrary.
+/// Returns `n` unit vectors in the order of the cloud; each sign is arbitrary. [`Estimator::Obne`] starts from the normals
+/// of [`Estimator::Wpca`] with the same `k`.
 ///
 /// # Errors
 /// [`Cancelled`] when `progress` asks to stop; nothing else.
@@ -52,6 +67,64 @@ pub fn estimate(
     estimator: Estimator,
     progress: &dyn Progress,
 ) -> Result<Vec<Vec3>, Cancelled> {
-    let _ = (cloud, neighbors, k, estimator, progress);
-    unimplemented!()
+    match estimator {
+        Estimator::Pca => pca(cloud, neighbors, k, progress),
+        Estimator::Wpca => wpca(cloud, neighbors, k, progress),
+        Estimator::Obne => {
+            let initial = wpca(cloud, neighbors, k, &Part::new(progress, 0.0..0.35))?;
+            obne(cloud, neighbors, k, &initial, &Part::new(progress, 0.35..1.0))
+        }
+    }
 }
+
+/// Points that one task handles at a time.
+const POINTS: usize = 1024;
+
+/// Calls `normal_of(point, offsets)` for each point, in parallel; `offsets` are the positions of its first `k` neighbors
+/// relative to its own.
+fn for_each_neighborhood(
+    cloud: &PointCloud,
+    neighbors: &Neighbors,
+    k: usize,
+    progress: &dyn Progress,
+    normal_of: impl Fn(usize, &[DVec3]) -> Vec3 + Sync,
+) -> Result<Vec<Vec3>, Cancelled> {
+    let positions = cloud.positions();
+    let k = k.min(neighbors.k());
+    let steps = Steps::new(progress, positions.len());
+    let mut normals = vec![Vec3::ZERO; positions.len()];
+    normals.par_chunks_mut(POINTS).enumerate().try_for_each_init(
+        || Vec::with_capacity(k),
+        |offsets, (task, normals)| {
+            for (i, normal) in normals.iter_mut().enumerate() {
+                let point = task * POINTS + i;
+                let center = positions[point].as_dvec3();
+                offsets.clear();
+                let row = &neighbors.of(point)[..k];
+                offsets.extend(
+                    row.iter()
+                        .map(|&neighbor| positions[neighbor as usize].as_dvec3() - center),
+                );
+                *normal = normal_of(point, offsets);
+            }
+            steps.advance(normals.len())
+        },
+    )?;
+    Ok(normals)
+}
+
+/// Square of the reach of the weights `exp(−d²/ρ²)` within a neighborhood: ρ is half the largest distance between two of
+/// its points, the center (offset zero) among them.
+fn squared_rho(offsets: &[DVec3]) -> f64 {
+    let mut largest: f64 = 0.0;
+    for (i, a) in offsets.iter().enumerate() {
+        largest = largest.max(a.length_squared());
+        for b in &offsets[..i] {
+            largest = largest.max((*a - *b).length_squared());
+        }
+    }
+    0.25 * largest
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,215 @@
+use glam::DVec3;
+
+use super::*;
+use crate::Silent;
+
+/// A flat grid of `side × side` points, and a second one a unit above when `sheets` is 2.
+fn sheets(side: usize, sheets: usize) -> PointCloud {
+    let positions = (0..side * side * sheets)
+        .map(|i| {
+            let (sheet, i) = (i / (side * side), i % (side * side));
+            // Sheared a little, so that distances are not all equal.
+            Vec3::new(
+                (i % side) as f32 + 0.3 * (i / side) as f32,
+                (i / side) as f32,
+                sheet as f32 * 1000.0,
+            )
+        })
+        .collect();
+    PointCloud::new(DVec3::ZERO, positions).unwrap()
+}
+
+/// The oriented normal of each point without any source.
+fn oriented(propagation: &Propagation) -> Vec<Vec3> {
+    let tree = &propagation.tree;
+    let mut turned = FixedBitSet::with_capacity(tree.n_points());
+    for position in 0..tree.n_points() as u32 {
+        let starts = propagation.initial_cuts.contains(position as usize);
+        let value = match tree.parent(position) {
+            Some(parent) if !starts => turned.contains(parent as usize) ^ tree.phi(parent) ^ tree.phi(position),
+            _ => propagation.initially_turned.contains(position as usize),
+        };
+        turned.set(position as usize, value);
+    }
+    (0..tree.n_points() as u32)
+        .map(|point| {
+            let normal = propagation.normals[point as usize];
+            if turned.contains(tree.position(point) as usize) {
+                -normal
+            } else {
+                normal
+            }
+        })
+        .collect()
+}
+
+fn propagate(cloud: &PointCloud, given: Option<&[Vec3]>, start: Start) -> Propagation {
+    let parameters = Parameters {
+        start,
+        ..Parameters::default()
+    };
+    Propagation::new(cloud, given, parameters, &Silent).unwrap()
+}
+
+#[test]
+fn each_component_starts_upward() {
+    let propagation = propagate(&sheets(12, 2), None, Start::Estimate);
+    assert_eq!(propagation.tree.roots().len(), 2);
+    assert!(propagation.initial_cuts.is_clear());
+    assert!(oriented(&propagation).iter().all(|normal| normal.z > 0.999));
+    let stages: Vec<Stage> = propagation.seconds.iter().map(|(stage, _)| *stage).collect();
+    assert_eq!(stages, [Stage::Neighbors, Stage::Normals, Stage::Graph, Stage::Tree]);
+}
+
+#[test]
+fn given_normals_are_kept_bit_by_bit() {
+    let cloud = sheets(15, 1);
+    // Not smooth, not quite unit, of mixed signs.
+    let given: Vec<Vec3> = (0..225)
+        .map(|i| {
+            let normal = Vec3::new((i as f32).sin(), (i as f32 * 1.7).cos(), 1.5).normalize_or_zero();
+            normal * if i % 7 < 3 { -1.0002 } else { 1.0001 }
+        })
+        .collect();
+    let propagation = propagate(&cloud, Some(&given), Start::Keep);
+    assert_eq!(oriented(&propagation), given);
+    assert!(!propagation.initial_cuts.is_clear());
+    for position in propagation.initial_cuts.ones() {
+        assert!(propagation.tree.parent(position as u32).is_some());
+    }
+}
+
+#[test]
+fn other_lengths_are_normalized() {
+    let cloud = sheets(5, 1);
+    let given = vec![Vec3::new(0.0, 0.0, -1e-30); 25];
+    let propagation = propagate(&cloud, Some(&given), Start::Keep);
+    assert!(oriented(&propagation).iter().all(|&normal| normal == Vec3::NEG_Z));
+}
+
+#[test]
+fn missing_normals_take_the_sign_that_reaches_them() {
+    let cloud = sheets(20, 2);
+    // On the first sheet a few downward normals, on the second none.
+    let mut given = vec![Vec3::ZERO; 800];
+    for point in [3, 250, 399] {
+        given[point] = Vec3::NEG_Z;
+    }
+    given[7] = Vec3::NAN;
+    let propagation = propagate(&cloud, Some(&given), Start::Keep);
+    let oriented = oriented(&propagation);
+    assert!(oriented[..400].iter().all(|normal| normal.z < -0.999));
+    assert!(oriented[400..].iter().all(|normal| normal.z > 0.999));
+    assert!(propagation.initial_cuts.is_clear());
+}
+
+#[test]
+fn given_signs_that_meet_across_missing_ones_are_cut_apart() {
+    let cloud = sheets(20, 1);
+    let mut given = vec![Vec3::ZERO; 400];
+    let up = [0, 5, 200, 211];
+    let down = [19, 30, 222, 399];
+    for point in up {
+        given[point] = Vec3::Z;
+    }
+    for point in down {
+        given[point] = Vec3::NEG_Z;
+    }
+    let propagation = propagate(&cloud, Some(&given), Start::Keep);
+    let oriented = oriented(&propagation);
+    assert!(up.iter().all(|&point| oriented[point] == Vec3::Z));
+    assert!(down.iter().all(|&point| oriented[point] == Vec3::NEG_Z));
+    assert!(oriented.iter().all(|normal| normal.z.abs() > 0.999));
+    let n_cuts = propagation.initial_cuts.count_ones(..);
+    assert!((1..8).contains(&n_cuts), "{n_cuts}");
+}
+
+#[test]
+fn keep_without_given_normals_estimates() {
+    let cloud = sheets(10, 1);
+    let kept = propagate(&cloud, None, Start::Keep);
+    let estimated = propagate(&cloud, None, Start::Estimate);
+    assert_eq!(kept.normals, estimated.normals);
+    assert_eq!(kept.initially_turned, estimated.initially_turned);
+    // With the other start, given normals don't count.
+    let given = vec![Vec3::X; 100];
+    let ignored = propagate(&cloud, Some(&given), Start::Estimate);
+    assert_eq!(ignored.normals, estimated.normals);
+}
+
+#[test]
+fn very_small_clouds() {
+    for n_points in 0..6 {
+        for spread in [0.0, 1.0] {
+            let positions: Vec<Vec3> = (0..n_points)
+                .map(|i| Vec3::new(i as f32, (i * i) as f32, 0.0) * spread)
+                .collect();
+            let cloud = PointCloud::new(DVec3::ZERO, positions).unwrap();
+            let propagation = propagate(&cloud, None, Start::Estimate);
+            assert_eq!(propagation.normals.len(), n_points);
+            assert!(propagation.normals.iter().all(|normal| normal.is_normalized()));
+            assert!(
+                propagation
+                    .splat_radii
+                    .iter()
+                    .all(|&radius| radius > 0.0 && radius.is_finite())
+            );
+            assert_eq!(propagation.tree.roots().len(), n_points.min(1));
+        }
+    }
+}
+
+#[test]
+fn radii_close_the_surface_but_no_outlier_covers_it() {
+    let mut positions: Vec<Vec3> = sheets(20, 1).positions().to_vec();
+    positions.push(Vec3::new(0.0, 0.0, 500.0));
+    // Seven more copies of one point.
+    positions.extend([positions[210]; 7]);
+    let cloud = PointCloud::new(DVec3::ZERO, positions).unwrap();
+    let radii = propagate(&cloud, None, Start::Estimate).splat_radii;
+    for (point, &radius) in radii.iter().enumerate() {
+        assert!((0.7..10.0).contains(&radius), "{point}: {radius}");
+    }
+}
+
+#[test]
+fn ks_outside_their_range_count_as_the_nearest() {
+    let cloud = sheets(10, 1);
+    let parameters = Parameters {
+        k_normals: 0,
+        k_graph: 0,
+        ..Parameters::default()
+    };
+    let low = Propagation::new(&cloud, None, parameters, &Silent).unwrap();
+    assert_eq!(low.parameters, parameters);
+    let parameters = Parameters {
+        k_normals: 3,
+        k_graph: 1,
+        ..Parameters::default()
+    };
+    let nearest = Propagation::new(&cloud, None, parameters, &Silent).unwrap();
+    assert_eq!(low.normals, nearest.normals);
+    assert_eq!(low.tree.order(), nearest.tree.order());
+}
+
+#[test]
+fn cancels_in_every_stage() {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// Cancels at the n-th report.
+    struct StopAt(usize, AtomicUsize);
+    impl Progress for StopAt {
+        fn report(&self, fraction: f32) -> Result<(), Cancelled> {
+            assert!((0.0..=1.0).contains(&fraction));
+            let count = self.1.fetch_add(1, Ordering::Relaxed);
+            if count >= self.0 { Err(Cancelled) } else { Ok(()) }
+        }
+    }
+    let cloud = sheets(40, 1);
+    let count = StopAt(usize::MAX, AtomicUsize::new(0));
+    Propagation::new(&cloud, None, Parameters::default(), &count).unwrap();
+    for stop in 0..count.1.into_inner() {
+        let result = Propagation::new(&cloud, None, Parameters::default(), &StopAt(stop, AtomicUsize::new(0)));
+        assert!(matches!(result, Err(Cancelled)), "report {stop}");
+    }
+}
