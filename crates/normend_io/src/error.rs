@@ -1,0 +1,193 @@
+//! What goes wrong with files, in one sentence each: where, why, and what to do.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use normend_core::Cancelled;
+
+/// Why a file cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// Stopped by the caller.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The system does not give the file out.
+    #[error("{}: {}", path.display(), io_words(source))]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The content is not what its format says, or not a format that is read.
+    #[error("{name}{}{broken}", if broken.place == Place::Whole { ": " } else { ", " })]
+    Broken {
+        /// The file as the caller named it.
+        name: String,
+        /// The place and the reason.
+        broken: Broken,
+    },
+}
+
+/// Why a file cannot be written; the target is as it was.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// Stopped by the caller.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The target is the file that was read.
+    #[error("{} is the file that was read: choose another name, or allow it to be written over", path.display())]
+    OverInput {
+        /// The target.
+        path: PathBuf,
+    },
+    /// The target is something that cannot be replaced by a file.
+    #[error("{} {reason}", path.display())]
+    Target {
+        /// The target.
+        path: PathBuf,
+        /// What it is and what to do.
+        reason: &'static str,
+    },
+    /// Not one normal for each point.
+    #[error("{n_normals} normals were given for {n_points} points: give one for each")]
+    Count {
+        /// Normals given.
+        n_normals: usize,
+        /// Points to write.
+        n_points: usize,
+    },
+    /// A normal is not of unit length, so it has no place in a file.
+    #[error("the normal of point {point} is ({}, {}, {}), not a unit vector: propagate again", normal.x, normal.y, normal.z)]
+    NotUnit {
+        /// Index of the first such point.
+        point: usize,
+        /// Its normal.
+        normal: glam::Vec3,
+    },
+    /// The system does not take the file.
+    #[error("{} cannot be written: {}", path.display(), io_words(source))]
+    Io {
+        /// The target.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The bytes that were read no longer make sense.
+    #[error("the file that was read cannot be copied: {0}")]
+    Source(Broken),
+}
+
+impl WriteError {
+    pub(crate) fn io(path: &Path) -> impl Fn(io::Error) -> Self + '_ {
+        |source| Self::Io {
+            path: path.to_owned(),
+            source,
+        }
+    }
+}
+
+/// A place in a file and what is wrong there.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Broken {
+    /// Where.
+    pub place: Place,
+    /// What is wrong and what to do.
+    pub reason: String,
+}
+
+/// Where in a file something is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The file as a whole.
+    Whole,
+    /// A line, counted from 1.
+    Line(usize),
+    /// A byte, counted from 0.
+    Byte(usize),
+}
+
+impl Broken {
+    pub(crate) fn whole(reason: impl Into<String>) -> Self {
+        Self::new(Place::Whole, reason)
+    }
+
+    pub(crate) fn new(place: Place, reason: impl Into<String>) -> Self {
+        Self {
+            place,
+            reason: reason.into(),
+        }
+    }
+}
+
+impl fmt::Display for Broken {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.place {
+            Place::Whole => {}
+            Place::Line(line) => write!(f, "line {line}: ")?,
+            Place::Byte(byte) => write!(f, "byte {byte}: ")?,
+        }
+        f.write_str(&self.reason)
+    }
+}
+
+impl std::error::Error for Broken {}
+
+/// Why reading stopped, before the file's name is known.
+pub(crate) enum Stop {
+    Cancelled(Cancelled),
+    Broken(Broken),
+}
+
+impl Stop {
+    pub(crate) fn in_file(self, name: &str) -> ReadError {
+        match self {
+            Self::Cancelled(cancelled) => ReadError::Cancelled(cancelled),
+            Self::Broken(broken) => ReadError::Broken {
+                name: name.to_owned(),
+                broken,
+            },
+        }
+    }
+}
+
+impl From<Cancelled> for Stop {
+    fn from(cancelled: Cancelled) -> Self {
+        Self::Cancelled(cancelled)
+    }
+}
+
+impl From<Broken> for Stop {
+    fn from(broken: Broken) -> Self {
+        Self::Broken(broken)
+    }
+}
+
+impl From<Stop> for WriteError {
+    fn from(stop: Stop) -> Self {
+        match stop {
+            Stop::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            Stop::Broken(broken) => Self::Source(broken),
+        }
+    }
+}
+
+/// An excerpt of a file for a message: short, printable, quoted.
+pub(crate) fn quoted(bytes: &[u8]) -> String {
+    const LONGEST: usize = 40;
+    let shown = String::from_utf8_lossy(&bytes[..bytes.len().min(LONGEST)]);
+    let dots = if bytes.len() > LONGEST { "…" } else { "" };
+    format!("\"{}{dots}\"", shown.escape_debug())
+}
+
+fn io_words(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file or folder: check the path".to_owned(),
+        io::ErrorKind::PermissionDenied => "the system forbids it: check the permissions".to_owned(),
+        io::ErrorKind::IsADirectory => "this is a folder: name a file".to_owned(),
+        io::ErrorKind::StorageFull => "the disk is full: free some space and try again".to_owned(),
+        io::ErrorKind::OutOfMemory => "it does not fit into memory: split the scan".to_owned(),
+        _ => error.to_string(),
+    }
+}

@@ -1,0 +1,300 @@
+//! Polygon File Format, in and out: ascii and both binary byte orders.
+//!
+//! The file's bytes are the truth: reading finds out where things are, and export copies everything but the normals.
+//! The elements besides `vertex` are walked through once, so that a cut-off file is noticed.
+
+mod header;
+mod rows;
+
+use normend_core::Progress;
+use ply_rs::ply::Encoding;
+
+pub(crate) use self::header::sniff;
+use self::header::{Element, Header, Kind};
+use self::rows::{FixedRows, WalkedRows, skip_element};
+use crate::error::{Broken, Place, Stop, quoted};
+use crate::table::{Layout, MOST_ROWS, Rows, Span, Starts, Table, VALUE_NAMES, find_parts, is_space};
+use crate::value::Scalar;
+
+/// A PLY file whose parts are known.
+#[derive(Clone, Debug)]
+pub(crate) struct PlyLayout {
+    header: Header,
+    /// Index of the element `vertex`.
+    vertex: usize,
+    /// Which properties of `vertex` are x y z nx ny nz.
+    slots: Slots,
+    table: Table,
+}
+
+/// Which properties of the element `vertex` are x y z nx ny nz.
+#[derive(Clone, Copy, Debug)]
+struct Slots {
+    /// Indices of properties; those of the normal only count when there is one.
+    properties: [usize; 6],
+    has_normals: bool,
+}
+
+/// Finds out where everything is in a PLY file, and refuses broken ones.
+pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<PlyLayout, Stop> {
+    let header = header::parse(bytes)?;
+    let vertex = find_vertex(&header)?;
+    let slots = find_slots(&header.elements[vertex])?;
+
+    let mut at = header.end;
+    for element in &header.elements[..vertex] {
+        at = skip_element(bytes, &header, element, at, progress)?;
+    }
+    let element = &header.elements[vertex];
+    rows::check_room(bytes, &header, element, at)?;
+    let scalar = |slot: usize| match element.properties[slots.properties[slot]].kind {
+        Kind::Scalar(scalar) => scalar,
+        Kind::List { item, .. } => item,
+    };
+    let mut normal_order = [0, 1, 2];
+    normal_order.sort_unstable_by_key(|component| slots.properties[3 + component]);
+    let mut layout = PlyLayout {
+        vertex,
+        slots,
+        table: Table {
+            n_rows: element.count,
+            types: std::array::from_fn(|slot| header.value_type(scalar(slot))),
+            has_normals: slots.has_normals,
+            normal_order,
+            starts: Starts::Parts(Vec::new()),
+            end: at,
+        },
+        header,
+    };
+    let element = &layout.header.elements[vertex];
+    let (starts, end) = match (layout.header.encoding, element.stride()) {
+        (Encoding::BinaryLittleEndian | Encoding::BinaryBigEndian, Some(stride)) => {
+            (Starts::Stride { first: at, stride }, at + element.count * stride)
+        }
+        _ => {
+            let mut rows = layout.rows(bytes, at);
+            let found = find_parts(rows.as_mut(), element.count, bytes.len(), progress);
+            let (starts, _, end) = found.map_err(|stop| layout.clearer(bytes, at, stop))?;
+            (Starts::Parts(starts), end)
+        }
+    };
+    layout.table.starts = starts;
+    layout.table.end = end;
+
+    let mut after = end;
+    for element in &layout.header.elements[vertex + 1..] {
+        let skipped = skip_element(bytes, &layout.header, element, after, progress);
+        after = skipped.map_err(|stop| layout.clearer(bytes, at, stop))?;
+    }
+    if layout.header.encoding == Encoding::Ascii
+        && bytes[after..].iter().any(|byte| !is_space(*byte))
+        && let Some(uneven) = layout.first_uneven_line(bytes, at, end)
+    {
+        // Something is left over, so rows are longer than declared: other columns would be taken for coordinates.
+        return Err(uneven.into());
+    }
+    Ok(layout)
+}
+
+fn find_vertex(header: &Header) -> Result<usize, Broken> {
+    let Some(vertex) = header.elements.iter().position(|element| element.name == "vertex") else {
+        let names: Vec<&str> = header.elements.iter().map(|element| element.name.as_str()).collect();
+        return Err(Broken::whole(format!(
+            "there is no element \"vertex\" (only {}): rename the one that holds the points",
+            quoted(names.join(", ").as_bytes())
+        )));
+    };
+    let element = &header.elements[vertex];
+    if element.count == 0 {
+        return Err(Broken::new(
+            Place::Line(element.line),
+            "the file has no points: open one that has",
+        ));
+    }
+    if element.count > MOST_ROWS {
+        return Err(Broken::new(
+            Place::Line(element.line),
+            format!(
+                "{} points are more than the {MOST_ROWS} that Normend can number: split the scan",
+                element.count
+            ),
+        ));
+    }
+    Ok(vertex)
+}
+
+fn find_slots(element: &Element) -> Result<Slots, Broken> {
+    let find = |name: &str| element.properties.iter().position(|property| property.name == name);
+    let scalar = |name: &str| -> Result<Option<usize>, Broken> {
+        match find(name) {
+            Some(index) if matches!(element.properties[index].kind, Kind::List { .. }) => Err(Broken::new(
+                Place::Line(element.properties[index].line),
+                format!("\"{name}\" is declared as a list: declare a number such as float"),
+            )),
+            found => Ok(found),
+        }
+    };
+    let mut properties = [0; 6];
+    for (slot, name) in VALUE_NAMES[..3].iter().enumerate() {
+        properties[slot] = scalar(name)?.ok_or_else(|| {
+            Broken::new(
+                Place::Line(element.line),
+                format!("the element \"vertex\" has no property \"{name}\": export the file with x, y and z"),
+            )
+        })?;
+    }
+    for names in [["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]] {
+        let found = [scalar(names[0])?, scalar(names[1])?, scalar(names[2])?];
+        if let [Some(x), Some(y), Some(z)] = found {
+            properties[3..].copy_from_slice(&[x, y, z]);
+            return Ok(Slots {
+                properties,
+                has_normals: true,
+            });
+        }
+        if let Some(index) = found.into_iter().flatten().next() {
+            return Err(Broken::new(
+                Place::Line(element.properties[index].line),
+                format!(
+                    "there is a part of a normal, but not all of {}: add or remove them",
+                    names.join(", ")
+                ),
+            ));
+        }
+    }
+    Ok(Slots {
+        properties,
+        has_normals: false,
+    })
+}
+
+impl Layout for PlyLayout {
+    fn table(&self) -> &Table {
+        &self.table
+    }
+
+    fn rows<'a>(&'a self, bytes: &'a [u8], start: usize) -> Box<dyn Rows + 'a> {
+        let element = &self.header.elements[self.vertex];
+        match (self.header.encoding, element.stride()) {
+            (Encoding::BinaryLittleEndian | Encoding::BinaryBigEndian, Some(stride)) => {
+                Box::new(FixedRows::new(element, &self.slots, start, stride))
+            }
+            _ => Box::new(WalkedRows::new(bytes, &self.header, element, &self.slots, start)),
+        }
+    }
+
+    fn place(&self, bytes: &[u8], byte: usize) -> Place {
+        rows::place(&self.header, bytes, byte)
+    }
+}
+
+impl PlyLayout {
+    /// In text, a row that is short or long shifts all that follow, and the end of the file is where that shows. So a
+    /// line that holds another number of values than a row, below lines that hold the right one, is named instead.
+    fn clearer(&self, bytes: &[u8], start: usize, stop: Stop) -> Stop {
+        match stop {
+            Stop::Broken(broken) if self.header.encoding == Encoding::Ascii => {
+                let end = bytes.len();
+                let uneven = self.first_uneven_line(bytes, start, end);
+                let first_line = self.place(bytes, start);
+                let is_last_line =
+                    |place: Place| match (place, rows::place(&self.header, bytes, bytes.trim_ascii_end().len())) {
+                        (Place::Line(line), Place::Line(last)) => line >= last,
+                        _ => true,
+                    };
+                match uneven {
+                    Some(uneven) if uneven.place != first_line && !is_last_line(uneven.place) => uneven.into(),
+                    _ => broken.into(),
+                }
+            }
+            stop => stop,
+        }
+    }
+
+    /// The first line between two bytes that holds another number of values than a row; `None` when rows have no fixed
+    /// number of values.
+    fn first_uneven_line(&self, bytes: &[u8], start: usize, end: usize) -> Option<Broken> {
+        let element = &self.header.elements[self.vertex];
+        element.stride()?;
+        let n_expected = element.properties.len();
+        let line_end = *self.header.line_end.last()?;
+        let lines = bytes[start..end].split(|byte| *byte == line_end).take(element.count);
+        let counts = lines.map(|line| {
+            line.split(|byte| is_space(*byte))
+                .filter(|word| !word.is_empty())
+                .count()
+        });
+        let Place::Line(first) = self.place(bytes, start) else {
+            return None;
+        };
+        for (index, n_values) in counts.enumerate() {
+            if n_values != 0 && n_values != n_expected {
+                return Some(Broken::new(
+                    Place::Line(first + index),
+                    format!(
+                        "{n_values} values where a row of element \"vertex\" has {n_expected}: correct the line, or the header"
+                    ),
+                ));
+            }
+        }
+        None
+    }
+
+    /// What changes before the first row when normals and `comment` are written: ranges of bytes and what takes their
+    /// place, in order.
+    pub(crate) fn header_edits(&self, comment: &str) -> Vec<(Span, Vec<u8>)> {
+        let header = &self.header;
+        let line_end = header.line_end;
+        let comment = comment.as_bytes().to_vec();
+        let mut edits = Vec::new();
+        match header.own_comment {
+            Some(span) => edits.push((span, comment)),
+            None => {
+                let at = header.after_format;
+                edits.push((Span { start: at, end: at }, [&comment, line_end].concat()));
+            }
+        }
+        let properties = &header.elements[self.vertex].properties;
+        if self.slots.has_normals {
+            for &slot in &self.slots.properties[3..] {
+                let property = &properties[slot];
+                if matches!(property.kind, Kind::Scalar(scalar) if !scalar.is_float()) {
+                    edits.push((property.type_span, b"float".to_vec()));
+                }
+            }
+        } else {
+            let last = self.slots.properties[..3].iter().max().map_or(0, |last| *last);
+            let at = properties[last].after_line;
+            let mut lines = Vec::new();
+            for name in &VALUE_NAMES[3..] {
+                lines.extend_from_slice(format!("property float {name}").as_bytes());
+                lines.extend_from_slice(line_end);
+            }
+            edits.push((Span { start: at, end: at }, lines));
+        }
+        edits.sort_by_key(|(span, _)| span.start);
+        edits
+    }
+}
+
+/// The header of a new binary little-endian file of points with `float` or `double` coordinates.
+pub(crate) fn new_header(n_points: usize, coordinates: Scalar, has_normals: bool, comment: Option<&str>) -> String {
+    let coordinate_type = if coordinates == Scalar::Double {
+        "double"
+    } else {
+        "float"
+    };
+    let mut lines = vec!["ply".to_owned(), "format binary_little_endian 1.0".to_owned()];
+    lines.extend(comment.map(str::to_owned));
+    lines.push(format!("element vertex {n_points}"));
+    lines.extend(
+        VALUE_NAMES[..3]
+            .iter()
+            .map(|name| format!("property {coordinate_type} {name}")),
+    );
+    if has_normals {
+        lines.extend(VALUE_NAMES[3..].iter().map(|name| format!("property float {name}")));
+    }
+    lines.push("end_header\n".to_owned());
+    lines.join("\n")
+}

@@ -1,0 +1,222 @@
+//! Single numbers as files hold them: text, or binary of some type and byte order.
+
+/// The types of binary numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Scalar {
+    Char,
+    UChar,
+    Short,
+    UShort,
+    Int,
+    UInt,
+    Float,
+    Double,
+}
+
+impl Scalar {
+    /// Size in bytes.
+    pub fn size(self) -> usize {
+        match self {
+            Self::Char | Self::UChar => 1,
+            Self::Short | Self::UShort => 2,
+            Self::Int | Self::UInt | Self::Float => 4,
+            Self::Double => 8,
+        }
+    }
+
+    pub fn is_float(self) -> bool {
+        matches!(self, Self::Float | Self::Double)
+    }
+}
+
+/// How a number is written down.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ValueType {
+    Text,
+    LittleEndian(Scalar),
+    BigEndian(Scalar),
+}
+
+macro_rules! from_bytes {
+    ($scalar:expr, $convert:ident, $bytes:expr) => {
+        match $scalar {
+            Scalar::Char => f64::from(i8::$convert($bytes.try_into().ok()?)),
+            Scalar::UChar => f64::from(u8::$convert($bytes.try_into().ok()?)),
+            Scalar::Short => f64::from(i16::$convert($bytes.try_into().ok()?)),
+            Scalar::UShort => f64::from(u16::$convert($bytes.try_into().ok()?)),
+            Scalar::Int => f64::from(i32::$convert($bytes.try_into().ok()?)),
+            Scalar::UInt => f64::from(u32::$convert($bytes.try_into().ok()?)),
+            Scalar::Float => f64::from(f32::$convert($bytes.try_into().ok()?)),
+            Scalar::Double => f64::$convert($bytes.try_into().ok()?),
+        }
+    };
+}
+
+impl ValueType {
+    /// Reads the number that `bytes` are, all of them; `None` when they are not one.
+    #[inline]
+    pub fn read(self, bytes: &[u8]) -> Option<f64> {
+        Some(match self {
+            Self::Text => return parse(bytes),
+            Self::LittleEndian(scalar) => from_bytes!(scalar, from_le_bytes, bytes),
+            Self::BigEndian(scalar) => from_bytes!(scalar, from_be_bytes, bytes),
+        })
+    }
+
+    /// Appends `value`: the shortest text that reads back as the same `f32`, a `double`, or a `float`, also in place of
+    /// an integer, which holds no component of a unit vector.
+    pub fn write(self, value: f32, out: &mut Vec<u8>) {
+        match self {
+            Self::Text => push_number(f64::from(value), true, out),
+            Self::LittleEndian(Scalar::Double) => out.extend_from_slice(&f64::from(value).to_le_bytes()),
+            Self::BigEndian(Scalar::Double) => out.extend_from_slice(&f64::from(value).to_be_bytes()),
+            Self::LittleEndian(_) => out.extend_from_slice(&value.to_le_bytes()),
+            Self::BigEndian(_) => out.extend_from_slice(&value.to_be_bytes()),
+        }
+    }
+
+    /// Appends `bytes`, a number of this type (text, `float` or `double`), with the opposite sign and nothing else changed.
+    pub fn write_negated(self, bytes: &[u8], out: &mut Vec<u8>) {
+        let start = out.len();
+        match self {
+            Self::Text => match bytes {
+                [b'-', digits @ ..] => out.extend_from_slice(digits),
+                [b'+', digits @ ..] | digits => {
+                    out.push(b'-');
+                    out.extend_from_slice(digits);
+                }
+            },
+            Self::LittleEndian(_) => {
+                out.extend_from_slice(bytes);
+                if let Some(byte) = out[start..].last_mut() {
+                    *byte ^= 0x80;
+                }
+            }
+            Self::BigEndian(_) => {
+                out.extend_from_slice(bytes);
+                if let Some(byte) = out[start..].first_mut() {
+                    *byte ^= 0x80;
+                }
+            }
+        }
+    }
+}
+
+/// Appends the shortest text that reads back as the same number: as `f32` when it `is_single`, else as `f64`.
+pub(crate) fn push_number(value: f64, is_single: bool, out: &mut Vec<u8>) {
+    use std::io::Write;
+    let magnitude = value.abs();
+    // `Display` writes no exponents, so very small and very large numbers would get hundreds of digits.
+    let plain = value == 0.0 || (1e-5..1e16).contains(&magnitude) || !value.is_finite();
+    // Writing to a vector cannot fail.
+    let _ = match (is_single, plain) {
+        _ if value.is_nan() => out.write_all(b"nan"),
+        (true, true) => write!(out, "{}", value as f32),
+        (true, false) => write!(out, "{:e}", value as f32),
+        (false, true) => write!(out, "{value}"),
+        (false, false) => write!(out, "{value:e}"),
+    };
+}
+
+/// Reads a number in text, also the ways in which C libraries write what is not finite (`-nan(ind)`, `1.#QNAN`).
+pub(crate) fn parse(token: &[u8]) -> Option<f64> {
+    if let Ok(value) = fast_float2::parse(token) {
+        return Some(value);
+    }
+    let unsigned = token.strip_prefix(b"-").or(token.strip_prefix(b"+")).unwrap_or(token);
+    let is_nan = unsigned
+        .get(..4)
+        .is_some_and(|start| start.eq_ignore_ascii_case(b"nan("))
+        && unsigned.ends_with(b")");
+    let is_microsoft = unsigned.starts_with(b"1.#");
+    (is_nan || is_microsoft).then_some(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_read_as_c_libraries_write_it() {
+        let check = |token: &str, expect: Option<f64>| {
+            let value = parse(token.as_bytes());
+            let same = match (value, expect) {
+                (Some(value), Some(expect)) => value == expect || (value.is_nan() && expect.is_nan()),
+                (value, expect) => value == expect,
+            };
+            assert!(same, "{token}: {value:?}, expected {expect:?}");
+        };
+        check("1", Some(1.0));
+        check("+1.5", Some(1.5));
+        check("-0.25e2", Some(-25.0));
+        check(".5", Some(0.5));
+        check("5.", Some(5.0));
+        check("1E-3", Some(0.001));
+        check("nan", Some(f64::NAN));
+        check("-NaN", Some(f64::NAN));
+        check("-nan(ind)", Some(f64::NAN));
+        check("1.#QNAN", Some(f64::NAN));
+        check("-1.#IND00", Some(f64::NAN));
+        check("inf", Some(f64::INFINITY));
+        check("-Infinity", Some(f64::NEG_INFINITY));
+        check("", None);
+        check("-", None);
+        check("1.5x", None);
+        check("1,5", None);
+        check("nano", None);
+        check("0x10", None);
+    }
+
+    #[test]
+    fn numbers_in_text_are_shortest() {
+        let check = |value: f64, is_single: bool, expect: &str| {
+            let mut out = Vec::new();
+            push_number(value, is_single, &mut out);
+            assert_eq!(String::from_utf8(out).unwrap(), expect);
+        };
+        check(0.0, true, "0");
+        check(-1.0, true, "-1");
+        check(f64::from(0.1_f32), true, "0.1");
+        check(f64::from(0.1_f32), false, "0.10000000149011612");
+        check(1.5e-30, false, "1.5e-30");
+        check(f64::from(3e-20_f32), true, "3e-20");
+        check(4_500_123.001, false, "4500123.001");
+        check(f64::NAN, true, "nan");
+        check(f64::NEG_INFINITY, false, "-inf");
+    }
+
+    #[test]
+    fn the_opposite_sign_changes_nothing_else() {
+        let check = |token: &str, expect: &str| {
+            let mut out = Vec::new();
+            ValueType::Text.write_negated(token.as_bytes(), &mut out);
+            assert_eq!(String::from_utf8(out).unwrap(), expect);
+        };
+        check("0.50", "-0.50");
+        check("-0.50", "0.50");
+        check("+0.50", "-0.50");
+        for value in [0.5_f64, -3.25, 0.0] {
+            for (value_type, bytes, expect) in [
+                (
+                    ValueType::LittleEndian(Scalar::Double),
+                    value.to_le_bytes().to_vec(),
+                    (-value).to_le_bytes().to_vec(),
+                ),
+                (
+                    ValueType::BigEndian(Scalar::Double),
+                    value.to_be_bytes().to_vec(),
+                    (-value).to_be_bytes().to_vec(),
+                ),
+                (
+                    ValueType::LittleEndian(Scalar::Float),
+                    (value as f32).to_le_bytes().to_vec(),
+                    (-value as f32).to_le_bytes().to_vec(),
+                ),
+            ] {
+                let mut out = vec![7];
+                value_type.write_negated(&bytes, &mut out);
+                assert_eq!(out[1..], expect);
+            }
+        }
+    }
+}

@@ -1,0 +1,447 @@
+//! Points in text, one a line, in and out: `.xyz`, `.txt`, `.asc`, `.pts`, `.csv`.
+//!
+//! Values are separated by spaces, tabs, commas or semicolons. Comments (`#`, `//`), empty lines, one line of column
+//! names and the counts of PTS files are kept as they are. Without column names, columns 4 to 6 are normals only when
+//! there are exactly six and they have unit length.
+
+use normend_core::Progress;
+
+use crate::error::{Broken, Place, Stop, quoted};
+use crate::table::{Layout, MOST_ROWS, Rows, Span, Spans, Starts, Table, VALUE_NAMES, find_parts, is_space};
+use crate::value::{ValueType, parse};
+
+/// Rows looked at to tell normals from colors.
+const SAMPLE_ROWS: usize = 1000;
+
+/// A text whose columns are known.
+#[derive(Clone, Debug)]
+pub(crate) struct XyzLayout {
+    /// What ends a line: `\n`, or `\r` when there is no `\n`.
+    line_end: u8,
+    /// The names of the columns, to the end of their line.
+    names: Option<Span>,
+    /// Whether lines with a single number announce how many points follow, as in PTS files.
+    has_counts: bool,
+    /// The columns of x y z nx ny nz; those of the normal only count when there is one.
+    columns: [usize; 6],
+    table: Table,
+}
+
+/// Finds out what the columns of a text are and where its lines are.
+pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<XyzLayout, Stop> {
+    let line_end = match memchr::memchr(b'\n', bytes) {
+        None if memchr::memchr(b'\r', bytes).is_some() => b'\r',
+        _ => b'\n',
+    };
+    let mut layout = XyzLayout {
+        line_end,
+        names: None,
+        has_counts: false,
+        columns: [0, 1, 2, 3, 4, 5],
+        table: Table {
+            n_rows: 0,
+            types: [ValueType::Text; 6],
+            has_normals: false,
+            normal_order: [0, 1, 2],
+            starts: Starts::Parts(Vec::new()),
+            end: 0,
+        },
+    };
+    let start = layout.find_columns(bytes)?;
+    layout
+        .table
+        .normal_order
+        .sort_unstable_by_key(|component| layout.columns[3 + component]);
+    let mut rows = XyzRows::new(&layout, bytes, start);
+    let (starts, n_rows, end) = find_parts(&mut rows, MOST_ROWS + 1, bytes.len(), progress)?;
+    if let Some((announced, line)) = rows.missing() {
+        return Err(Broken::new(
+            line,
+            format!("{announced} points are announced, but fewer follow: the file is cut off or the count is wrong"),
+        )
+        .into());
+    }
+    if n_rows == 0 {
+        return Err(Broken::whole("the file has no points: open one that has").into());
+    }
+    if n_rows > MOST_ROWS {
+        return Err(Broken::whole(format!(
+            "more than the {MOST_ROWS} points that Normend can number: split the scan"
+        ))
+        .into());
+    }
+    layout.table.n_rows = n_rows;
+    layout.table.starts = Starts::Parts(starts);
+    layout.table.end = end;
+    Ok(layout)
+}
+
+/// Whether the first lines look like points in text.
+pub(crate) fn sniff(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(1 << 12)];
+    let mut lines = head
+        .split(|byte| matches!(byte, b'\n' | b'\r'))
+        .filter(|line| !is_skipped(line))
+        .take(3);
+    !head.contains(&0)
+        && lines.any(|line| {
+            Values::new(line)
+                .take(3)
+                .filter(|span| parse(span.of(line)).is_some())
+                .count()
+                == 3
+        })
+}
+
+impl XyzLayout {
+    /// Finds the columns, by their names or by looking at the first rows; returns the byte where the first row may begin.
+    fn find_columns(&mut self, bytes: &[u8]) -> Result<usize, Broken> {
+        // A byte order mark is no value.
+        let start = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+        let mut lines = Lines {
+            bytes,
+            line_end: self.line_end,
+            at: start,
+        };
+        let mut row_start = start;
+        let mut title = None;
+        let mut names = Vec::new();
+        let first_row = loop {
+            let at = lines.at;
+            let Some(line) = lines.next() else {
+                return Ok(row_start);
+            };
+            let content = line.of(bytes);
+            if is_skipped(content) {
+                // CloudCompare writes the names into a comment.
+                let hidden = content
+                    .iter()
+                    .take_while(|byte| is_space(**byte) || matches!(byte, b'#' | b'/'))
+                    .count();
+                names.push(Span {
+                    start: line.start + hidden,
+                    end: line.end,
+                });
+                continue;
+            }
+            let mut values = Values::new(content);
+            if values.next().is_none_or(|value| parse(value.of(content)).is_none()) {
+                if title.is_some() {
+                    return Err(self.not_a_row(bytes, line));
+                }
+                title = Some(line);
+                names.push(line);
+                row_start = lines.at;
+            } else if values.next().is_some() {
+                lines.at = at;
+                break line;
+            } else {
+                self.has_counts = true;
+            }
+        };
+        self.refuse_decimal_commas(bytes, first_row)?;
+        let n_columns = Values::new(first_row.of(bytes)).count();
+        names.retain(|names| Values::new(names.of(bytes)).count() == n_columns);
+        let named = names
+            .iter()
+            .find_map(|names| Some((*names, columns_by_name(names.of(bytes))?)));
+        if let Some((names, (columns, has_normals))) = named {
+            self.names = Some(names);
+            self.columns = columns;
+            self.table.has_normals = has_normals;
+        } else {
+            self.names = title.filter(|title| names.contains(title));
+            self.table.has_normals = self.sample_is_normals(bytes, lines);
+        }
+        Ok(row_start)
+    }
+
+    fn not_a_row(&self, bytes: &[u8], line: Span) -> Broken {
+        Broken::new(
+            self.place(bytes, line.start),
+            format!(
+                "{} does not begin with a number: correct or remove the line",
+                quoted(line.of(bytes).trim_ascii())
+            ),
+        )
+    }
+
+    /// Commas in numbers and commas between numbers cannot be told apart, so the doubtful are refused.
+    fn refuse_decimal_commas(&self, bytes: &[u8], line: Span) -> Result<(), Broken> {
+        let content = line.of(bytes).trim_ascii();
+        let has_semicolons = content.contains(&b';');
+        let has_plain_spaces = Values::new(content)
+            .zip(Values::new(content).skip(1))
+            .any(|(value, next)| {
+                let between = &content[value.end..next.start];
+                !between.contains(&b',') && !between.contains(&b';')
+            });
+        if content.contains(&b',') && (has_semicolons || has_plain_spaces) {
+            return Err(Broken::new(
+                self.place(bytes, line.start),
+                format!(
+                    "{} has commas besides other separators, as in decimal commas: write numbers with a point",
+                    quoted(content)
+                ),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Whether the first rows have six columns of which the last three are unit vectors (or zero, but not all).
+    fn sample_is_normals(&self, bytes: &[u8], lines: Lines<'_>) -> bool {
+        let mut n_units = 0;
+        for line in lines.filter(|line| !is_skipped(line.of(bytes))).take(SAMPLE_ROWS) {
+            let content = line.of(bytes);
+            let values: Vec<f64> = Values::new(content)
+                .take(7)
+                .map_while(|value| parse(value.of(content)))
+                .collect();
+            match values[..] {
+                [_, _, _, nx, ny, nz] => {
+                    let squared_length = nx * nx + ny * ny + nz * nz;
+                    if (squared_length - 1.0).abs() < 0.02 {
+                        n_units += 1;
+                    } else if squared_length != 0.0 {
+                        return false;
+                    }
+                }
+                // The count of a PTS file.
+                [_] => {}
+                _ => return false,
+            }
+        }
+        n_units > 0
+    }
+
+    /// What changes before the first row when normals are written: the names of their columns, if columns have names.
+    pub(crate) fn header_edits(&self, bytes: &[u8]) -> Vec<(Span, Vec<u8>)> {
+        let (Some(names), false) = (self.names, self.table.has_normals) else {
+            return Vec::new();
+        };
+        let content = names.of(bytes);
+        let last = self.columns[..3].iter().max().map_or(2, |last| *last);
+        let Some(name) = Values::new(content).nth(last) else {
+            return Vec::new();
+        };
+        let at = names.start + name.end;
+        let name = name.of(content);
+        let separator = crate::rewrite::separator_before(self, bytes, at - name.len());
+        let mut insertion = Vec::new();
+        for new_name in &VALUE_NAMES[3..] {
+            insertion.extend_from_slice(separator);
+            let is_capital = name.first().is_some_and(u8::is_ascii_uppercase);
+            insertion.push(if is_capital { b'N' } else { b'n' });
+            insertion.extend_from_slice(&new_name.as_bytes()[1..]);
+        }
+        vec![(Span { start: at, end: at }, insertion)]
+    }
+}
+
+impl Layout for XyzLayout {
+    fn table(&self) -> &Table {
+        &self.table
+    }
+
+    fn rows<'a>(&'a self, bytes: &'a [u8], start: usize) -> Box<dyn Rows + 'a> {
+        Box::new(XyzRows::new(self, bytes, start))
+    }
+
+    fn place(&self, bytes: &[u8], byte: usize) -> Place {
+        Place::Line(1 + memchr::memchr_iter(self.line_end, &bytes[..byte]).count())
+    }
+
+    fn is_separator(&self, byte: u8) -> bool {
+        is_space(byte) || matches!(byte, b',' | b';')
+    }
+}
+
+/// The columns of x y z nx ny nz by their names, and whether there are normals; `None` without x, y and z.
+fn columns_by_name(line: &[u8]) -> Option<([usize; 6], bool)> {
+    let is_quote = |byte: &u8| matches!(byte, b'"' | b'\'');
+    let names: Vec<String> = Values::new(line)
+        .map(|name| {
+            name.of(line)
+                .iter()
+                .filter(|byte| !is_quote(byte))
+                .map(|byte| byte.to_ascii_lowercase() as char)
+                .collect()
+        })
+        .collect();
+    let find = |wanted: &[&str]| names.iter().position(|name| wanted.contains(&name.as_str()));
+    let [x, y, z] = [find(&["x"])?, find(&["y"])?, find(&["z"])?];
+    let normal = (|| {
+        Some([
+            find(&["nx", "normal_x", "normalx"])?,
+            find(&["ny", "normal_y", "normaly"])?,
+            find(&["nz", "normal_z", "normalz"])?,
+        ])
+    })();
+    let [nx, ny, nz] = normal.unwrap_or([0; 3]);
+    Some(([x, y, z, nx, ny, nz], normal.is_some()))
+}
+
+/// Whether a line holds no point: a comment or nothing.
+fn is_skipped(line: &[u8]) -> bool {
+    let content = line.trim_ascii_start();
+    content.is_empty() || content.starts_with(b"#") || content.starts_with(b"//")
+}
+
+/// The lines of a text, without their ends.
+#[derive(Clone, Copy)]
+struct Lines<'a> {
+    bytes: &'a [u8],
+    line_end: u8,
+    at: usize,
+}
+
+impl Iterator for Lines<'_> {
+    type Item = Span;
+
+    fn next(&mut self) -> Option<Span> {
+        if self.at == self.bytes.len() {
+            return None;
+        }
+        let start = self.at;
+        let rest = &self.bytes[start..];
+        let length = memchr::memchr(self.line_end, rest);
+        self.at = length.map_or(self.bytes.len(), |length| start + length + 1);
+        let line = &rest[..length.unwrap_or(rest.len())];
+        let line = line.strip_suffix(b"\r").unwrap_or(line);
+        Some(Span {
+            start,
+            end: start + line.len(),
+        })
+    }
+}
+
+/// The values of a line: separated by spaces, or by one comma or semicolon with spaces around it.
+struct Values<'a> {
+    line: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Values<'a> {
+    fn new(line: &'a [u8]) -> Self {
+        Self { line, at: 0 }
+    }
+
+    fn skip_spaces(&mut self) {
+        while self.at < self.line.len() && is_space(self.line[self.at]) {
+            self.at += 1;
+        }
+    }
+}
+
+impl Iterator for Values<'_> {
+    type Item = Span;
+
+    #[inline]
+    fn next(&mut self) -> Option<Span> {
+        self.skip_spaces();
+        if self.at == self.line.len() {
+            return None;
+        }
+        let start = self.at;
+        let is_end = |byte: &u8| is_space(*byte) || matches!(byte, b',' | b';');
+        let end = start
+            + self.line[start..]
+                .iter()
+                .position(is_end)
+                .unwrap_or(self.line.len() - start);
+        self.at = end;
+        self.skip_spaces();
+        if matches!(self.line.get(self.at), Some(b',' | b';')) {
+            self.at += 1;
+        }
+        Some(Span { start, end })
+    }
+}
+
+struct XyzRows<'a> {
+    layout: &'a XyzLayout,
+    bytes: &'a [u8],
+    lines: Lines<'a>,
+    /// Which value each column is, for the columns that matter.
+    slots: Vec<Option<usize>>,
+    /// Points that the last count announced and that did not come yet, the count, and where it stands.
+    announced: Option<(usize, usize, usize)>,
+}
+
+impl<'a> XyzRows<'a> {
+    fn new(layout: &'a XyzLayout, bytes: &'a [u8], start: usize) -> Self {
+        let columns = &layout.columns[..if layout.table.has_normals { 6 } else { 3 }];
+        let n_columns = 1 + columns.iter().max().map_or(0, |last| *last);
+        Self {
+            layout,
+            bytes,
+            lines: Lines {
+                bytes,
+                line_end: layout.line_end,
+                at: start,
+            },
+            slots: (0..n_columns)
+                .map(|column| columns.iter().position(|wanted| *wanted == column))
+                .collect(),
+            announced: None,
+        }
+    }
+
+    /// The count of points that was not reached, and its place.
+    fn missing(&self) -> Option<(usize, Place)> {
+        let (n_missing, announced, at) = self.announced?;
+        (n_missing > 0).then(|| (announced, self.layout.place(self.bytes, at)))
+    }
+}
+
+impl Rows for XyzRows<'_> {
+    fn next_row(&mut self) -> Result<Option<Spans>, Broken> {
+        loop {
+            let Some(line) = self.lines.next() else {
+                return Ok(None);
+            };
+            let content = line.of(self.bytes);
+            if is_skipped(content) {
+                continue;
+            }
+            let mut spans = Spans::default();
+            let mut n_columns = 0;
+            for (value, slot) in Values::new(content).zip(&self.slots) {
+                n_columns += 1;
+                if let Some(slot) = slot {
+                    spans[*slot] = Span {
+                        start: line.start + value.start,
+                        end: line.start + value.end,
+                    };
+                }
+            }
+            if n_columns == self.slots.len() {
+                if let Some((n_missing, ..)) = &mut self.announced {
+                    *n_missing = n_missing.saturating_sub(1);
+                }
+                return Ok(Some(spans));
+            }
+            let count = std::str::from_utf8(content.trim_ascii())
+                .ok()
+                .and_then(|text| text.parse::<usize>().ok());
+            let is_count_due = self.layout.has_counts && self.announced.is_none_or(|(n_missing, ..)| n_missing == 0);
+            match count {
+                Some(count) if n_columns == 1 && is_count_due => self.announced = Some((count, count, line.start)),
+                _ => {
+                    return Err(Broken::new(
+                        self.layout.place(self.bytes, line.start),
+                        format!(
+                            "{n_columns} values where at least {} belong: correct or remove the line {}",
+                            self.slots.len(),
+                            quoted(content)
+                        ),
+                    ));
+                }
+            }
+        }
+    }
+
+    fn position(&self) -> usize {
+        self.lines.at
+    }
+}
