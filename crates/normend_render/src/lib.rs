@@ -4,11 +4,26 @@
 //! an edit turns is a few ranges.
 
 pub mod camera;
+mod cloud_buffers;
 pub mod display_mode;
+mod error;
+mod gpu_types;
+pub mod headless;
+mod marks;
+mod pass;
+mod pick;
 pub mod renderer;
+mod shader;
 
-pub use camera::{Camera, Projection, StandardView};
-pub use display_mode::DisplayMode;
+#[cfg(test)]
+mod picture_tests;
+
+pub use camera::{BoundingSphere, Camera, Projection, StandardView};
+pub use display_mode::{DisplayMode, DrawSettings, Palette};
 /// The one wgpu of the workspace: the version that eframe draws with.
 pub use egui_wgpu::wgpu;
-pub use renderer::{DrawSettings, Hit, Palette, PickRequest, RenderError, Sphere, SplatRenderer};
+pub use error::RenderError;
+pub use headless::HeadlessDevice;
+pub use marks::Sphere;
+pub use pick::{Hit, PickRequest};
+pub use renderer::SplatRenderer;

@@ -1,0 +1,143 @@
+//! The passes of a picture: splats and spheres leave ids, depths and surfaces in [`Targets`]; shading makes colors of them.
+
+pub mod shade;
+pub mod sphere;
+pub mod splat;
+
+use egui_wgpu::wgpu;
+
+/// Id and clip-space depth of what is seen. Not the depth texture itself and not a float texture: the one cannot be
+/// read on OpenGL, the other cannot be drawn to.
+pub const SEEN_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
+/// Packed normal and cosine of what is seen.
+pub const SURFACE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
+/// Reversed depth: near 1, far 0.
+pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// Gamma-encoded colors, as egui takes them.
+pub const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// The textures of one picture size.
+pub struct Targets {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Ids and depths.
+    pub seen: wgpu::Texture,
+    /// View of `seen`.
+    pub seen_view: wgpu::TextureView,
+    /// View of the surfaces.
+    pub surface_view: wgpu::TextureView,
+    /// View of the depth buffer.
+    pub depth_view: wgpu::TextureView,
+    /// The finished picture.
+    pub picture: wgpu::Texture,
+    /// View of `picture`.
+    pub picture_view: wgpu::TextureView,
+}
+
+impl Targets {
+    /// Textures of `size`, each side at least 1 and within the device's limits.
+    pub fn new(device: &wgpu::Device, size: [u32; 2]) -> Self {
+        let texture = |label, format, usage| {
+            device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d {
+                    width: size[0],
+                    height: size[1],
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
+                view_formats: &[],
+            })
+        };
+        let (read, copy) = (wgpu::TextureUsages::TEXTURE_BINDING, wgpu::TextureUsages::COPY_SRC);
+        let seen = texture("seen", SEEN_FORMAT, read | copy);
+        let surface = texture("surfaces", SURFACE_FORMAT, read);
+        let depth = texture("depth", DEPTH_FORMAT, wgpu::TextureUsages::empty());
+        let picture = texture("picture", PICTURE_FORMAT, read | copy);
+        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Self {
+            size,
+            seen_view: view(&seen),
+            surface_view: view(&surface),
+            depth_view: view(&depth),
+            picture_view: view(&picture),
+            seen,
+            picture,
+        }
+    }
+
+    /// Begins the geometry pass: everything cleared to background.
+    pub fn begin_geometry<'a>(&self, encoder: &'a mut wgpu::CommandEncoder) -> wgpu::RenderPass<'a> {
+        let cleared = |view| {
+            Some(wgpu::RenderPassColorAttachment {
+                view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    store: wgpu::StoreOp::Store,
+                },
+            })
+        };
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("geometry"),
+            color_attachments: &[cleared(&self.seen_view), cleared(&self.surface_view)],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.depth_view,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Discard,
+                }),
+                stencil_ops: None,
+            }),
+            timestamp_writes: None,
+            occlusion_query_set: None,
+            multiview_mask: None,
+        })
+    }
+}
+
+/// A pipeline that draws into the geometry targets.
+fn geometry_pipeline(
+    device: &wgpu::Device,
+    label: &str,
+    module: &wgpu::ShaderModule,
+    layouts: &[Option<&wgpu::BindGroupLayout>],
+) -> wgpu::RenderPipeline {
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(label),
+        bind_group_layouts: layouts,
+        immediate_size: 0,
+    });
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(label),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some("vertex"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH_FORMAT,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Greater),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some("fragment"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &[Some(SEEN_FORMAT.into()), Some(SURFACE_FORMAT.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}

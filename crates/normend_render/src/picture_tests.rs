@@ -1,0 +1,4 @@
+//! Pictures, checked by counting pixels, and shaders, checked without a GPU.
+
+mod pictures;
+mod shaders;

@@ -1,0 +1,565 @@
+//! What is on pictures of small clouds, counted pixel by pixel on a real device.
+
+use std::f32::consts::PI;
+
+use egui_wgpu::wgpu;
+use glam::{UVec2, Vec2, Vec3};
+
+use crate::gpu_types::{ID_NONE, ID_SPHERE};
+use crate::{
+    Camera, DisplayMode, DrawSettings, HeadlessDevice, Hit, Palette, Projection, RenderError, Sphere, SplatRenderer,
+    StandardView,
+};
+
+const SIZE: [u32; 2] = [320, 240];
+const ASPECT: f32 = SIZE[0] as f32 / SIZE[1] as f32;
+
+/// A device; `None`, said aloud, on a machine without graphics. `NORMEND_REQUIRE_GPU=1` makes that a failure.
+fn device_for(backends: Option<wgpu::Backends>) -> Option<HeadlessDevice> {
+    match backends.map_or_else(HeadlessDevice::new, HeadlessDevice::with_backends) {
+        Ok(device) => Some(device),
+        Err(error) if std::env::var_os("NORMEND_REQUIRE_GPU").is_some_and(|value| value == "1") => panic!("{error}"),
+        Err(error) => {
+            eprintln!("skipped: no graphics adapter ({error})");
+            None
+        }
+    }
+}
+
+/// A small cloud with unit normals and radii that close its surface.
+struct Cloud {
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    radii: Vec<f32>,
+}
+
+impl Cloud {
+    /// `n` points spread evenly over a sphere (Fibonacci lattice), normals outward. Ascending in z.
+    fn sphere(n: usize, center: Vec3, radius: f32) -> Self {
+        let golden = PI * (3.0 - 5.0_f32.sqrt());
+        let normals: Vec<Vec3> = (0..n)
+            .map(|i| {
+                let z = (2.0 * i as f32 + 1.0) / n as f32 - 1.0;
+                let (sin, cos) = (golden * i as f32).sin_cos();
+                Vec3::new(cos * (1.0 - z * z).sqrt(), sin * (1.0 - z * z).sqrt(), z)
+            })
+            .collect();
+        let spacing = radius * (4.0 * PI / n as f32).sqrt();
+        Self {
+            positions: normals.iter().map(|&d| center + radius * d).collect(),
+            normals,
+            radii: vec![spacing; n],
+        }
+    }
+
+    /// A square plate in the plane y = `y`, `n` × `n` points, normals toward −y.
+    fn plate(n: usize, y: f32, half: f32) -> Self {
+        let step = 2.0 * half / (n - 1) as f32;
+        let at = |i: usize| step * i as f32 - half;
+        let positions = (0..n * n).map(|i| Vec3::new(at(i % n), y, at(i / n))).collect();
+        Self {
+            positions,
+            normals: vec![Vec3::NEG_Y; n * n],
+            radii: vec![step; n * n],
+        }
+    }
+
+    fn join(mut self, other: Self) -> Self {
+        self.positions.extend(other.positions);
+        self.normals.extend(other.normals);
+        self.radii.extend(other.radii);
+        self
+    }
+
+    fn len(&self) -> u32 {
+        self.positions.len() as u32
+    }
+}
+
+/// A renderer with a cloud, and what it drew last.
+struct Scene {
+    gpu: HeadlessDevice,
+    renderer: SplatRenderer,
+    camera: Camera,
+    settings: DrawSettings,
+}
+
+impl Scene {
+    fn new(cloud: &Cloud) -> Option<Self> {
+        Self::with(cloud, None, usize::MAX)
+    }
+
+    fn with(cloud: &Cloud, backends: Option<wgpu::Backends>, chunk_points: usize) -> Option<Self> {
+        let gpu = device_for(backends)?;
+        let mut renderer = match chunk_points {
+            usize::MAX => SplatRenderer::new(&gpu.device),
+            n => SplatRenderer::with_chunks(&gpu.device, n),
+        };
+        let Cloud {
+            positions,
+            normals,
+            radii,
+        } = cloud;
+        renderer
+            .set_cloud(&gpu.device, &gpu.queue, positions, Some(normals), radii, None)
+            .unwrap();
+        let camera = Camera::framing(Vec3::splat(-1.0), Vec3::ONE, StandardView::Front, ASPECT);
+        Some(Self {
+            gpu,
+            renderer,
+            camera,
+            settings: DrawSettings::default(),
+        })
+    }
+
+    fn draw(&mut self) -> bool {
+        let HeadlessDevice { device, queue, .. } = &self.gpu;
+        self.renderer
+            .draw(device, queue, &self.camera, SIZE, 1.0, &self.settings)
+    }
+
+    /// Draws and reads colors and ids back.
+    fn shoot(&mut self) -> Picture {
+        self.draw();
+        let HeadlessDevice { device, queue, .. } = &self.gpu;
+        let (size, bytes) = self.renderer.read_picture(device, queue).unwrap();
+        assert_eq!(size, SIZE);
+        let colors = bytes.chunks_exact(4).map(|c| [c[0], c[1], c[2]]).collect();
+        let ids = self
+            .renderer
+            .read_seen(device, queue)
+            .unwrap()
+            .iter()
+            .map(|seen| seen[0])
+            .collect();
+        Picture { colors, ids }
+    }
+
+    fn turn(&mut self, ranges: &[std::ops::Range<u32>]) {
+        self.renderer.turn(&self.gpu.queue, ranges);
+    }
+
+    fn highlight(&mut self, ranges: &[std::ops::Range<u32>]) {
+        self.renderer.set_highlight(&self.gpu.device, &self.gpu.queue, ranges);
+    }
+
+    fn set_spheres(&mut self, spheres: &[Sphere]) {
+        self.renderer.set_spheres(&self.gpu.device, &self.gpu.queue, spheres);
+    }
+
+    fn pick(&self, x: u32, y: u32) -> Option<Hit> {
+        self.renderer
+            .pick(&self.gpu.device, &self.gpu.queue, [x, y])
+            .unwrap()
+            .wait(&self.gpu.device)
+    }
+}
+
+#[derive(Clone, PartialEq)]
+struct Picture {
+    colors: Vec<[u8; 3]>,
+    ids: Vec<u32>,
+}
+
+impl Picture {
+    fn is_front(color: [u8; 3]) -> bool {
+        color[2] > color[0]
+    }
+
+    fn splats(&self) -> impl Iterator<Item = (u32, [u8; 3])> {
+        let pairs = self.ids.iter().zip(&self.colors);
+        pairs
+            .filter(|(id, _)| **id != ID_NONE && **id & ID_SPHERE == 0)
+            .map(|(id, color)| (id - 1, *color))
+    }
+
+    /// Pixels of splats that show their front, and all pixels of splats.
+    fn count_front(&self) -> (usize, usize) {
+        let front = self.splats().filter(|&(_, color)| Self::is_front(color)).count();
+        (front, self.splats().count())
+    }
+
+    /// Background pixels that have splats to their left, right, above and below: holes in a convex silhouette.
+    fn count_holes(&self) -> usize {
+        let [width, height] = SIZE.map(|len| len as usize);
+        let seen = |x: usize, y: usize| self.ids[y * width + x] != ID_NONE;
+        let hole = |x: usize, y: usize| {
+            !seen(x, y)
+                && (0..x).any(|x| seen(x, y))
+                && (x..width).any(|x| seen(x, y))
+                && (0..y).any(|y| seen(x, y))
+                && (y..height).any(|y| seen(x, y))
+        };
+        (0..width * height).filter(|i| hole(i % width, i / width)).count()
+    }
+}
+
+#[test]
+fn a_sphere_is_closed_and_all_front_from_outside_at_any_zoom() {
+    let cloud = Cloud::sphere(20_000, Vec3::ZERO, 1.0);
+    let Some(mut scene) = Scene::new(&cloud) else { return };
+    for projection in [Projection::Perspective, Projection::Orthographic] {
+        for distance in [1.6, 3.0, 9.0, 40.0, 400.0] {
+            scene.camera = Camera::framing(Vec3::splat(-1.0), Vec3::ONE, StandardView::Corner, ASPECT);
+            scene.camera.projection = projection;
+            scene.camera.distance = distance;
+            let picture = scene.shoot();
+            let (front, all) = picture.count_front();
+            assert!(all > 2, "nothing drawn at distance {distance}");
+            assert_eq!(front, all, "back pixels at distance {distance}, {projection:?}");
+            assert_eq!(picture.count_holes(), 0, "holes at distance {distance}, {projection:?}");
+        }
+    }
+}
+
+#[test]
+fn a_sphere_is_closed_and_all_back_from_inside() {
+    let cloud = Cloud::sphere(20_000, Vec3::ZERO, 1.0);
+    let Some(mut scene) = Scene::new(&cloud) else { return };
+    scene.camera.distance = 0.2;
+    for azimuth in [0.0, 1.0, 2.0] {
+        scene.camera.azimuth = azimuth;
+        let picture = scene.shoot();
+        assert_eq!(picture.count_front(), (0, (SIZE[0] * SIZE[1]) as usize));
+    }
+}
+
+#[test]
+fn turning_a_range_changes_exactly_its_pixels_and_uploads_its_words() {
+    let cloud = Cloud::sphere(20_000, Vec3::ZERO, 1.0);
+    let Some(mut scene) = Scene::new(&cloud) else { return };
+    let before = scene.shoot();
+    let ranges = [100..900, 9_990..10_111, 10_500..10_501];
+    let uploaded = scene.renderer.bytes_uploaded();
+    scene.turn(&ranges);
+    // 26 words of the first range; the others lie near each other and go together, 17 words with those between.
+    assert_eq!(scene.renderer.bytes_uploaded() - uploaded, (26 + 17) * 4);
+    let after = scene.shoot();
+    let is_turned = |instance: u32| ranges.iter().any(|range| range.contains(&instance));
+    assert!(before.splats().any(|(instance, _)| is_turned(instance)));
+    assert!(before.ids == after.ids);
+    for ((instance, old), (_, new)) in before.splats().zip(after.splats()) {
+        assert_eq!(
+            old != new,
+            is_turned(instance),
+            "instance {instance}: {old:?} to {new:?}"
+        );
+        assert_eq!(Picture::is_front(new), !is_turned(instance), "instance {instance}");
+    }
+    scene.turn(&ranges);
+    assert!(scene.shoot() == before, "turning twice is not the same as nothing");
+    let mut words = vec![0_u32; cloud.positions.len() / 32];
+    words[320] = u32::MAX;
+    scene.renderer.set_turned(&scene.gpu.queue, &words);
+    scene.turn(&[10_240..10_272]);
+    assert!(
+        scene.shoot() == before,
+        "setting words and turning them back is not the same as nothing"
+    );
+}
+
+#[test]
+fn a_highlight_changes_its_pixels_alone_and_uploads_ranges_alone() {
+    let cloud = Cloud::sphere(20_000, Vec3::ZERO, 1.0);
+    let Some(mut scene) = Scene::new(&cloud) else { return };
+    for mode in DisplayMode::ALL {
+        scene.settings.mode = mode;
+        scene.highlight(&[]);
+        let before = scene.shoot();
+        let ranges = [3..5, 8_000..9_000, 12_000..12_700];
+        let uploaded = scene.renderer.bytes_uploaded();
+        scene.highlight(&ranges);
+        assert_eq!(scene.renderer.bytes_uploaded() - uploaded, 3 * 8);
+        let after = scene.shoot();
+        let mut n_changed = 0;
+        for ((instance, old), (_, new)) in before.splats().zip(after.splats()) {
+            let inside = ranges.iter().any(|range| range.contains(&instance));
+            assert_eq!(old != new, inside, "instance {instance}: {old:?} to {new:?}");
+            n_changed += usize::from(inside);
+        }
+        assert!(n_changed > 100);
+    }
+}
+
+#[test]
+fn picks_return_what_is_drawn_and_where() {
+    let cloud = Cloud::sphere(20_000, Vec3::ZERO, 1.0);
+    let Some(mut scene) = Scene::new(&cloud) else { return };
+    for projection in [Projection::Perspective, Projection::Orthographic] {
+        scene.camera.projection = projection;
+        let picture = scene.shoot();
+        let center = UVec2::from(SIZE) / 2;
+        for (x, y) in [
+            (center.x, center.y),
+            (center.x - 60, center.y + 40),
+            (center.x + 75, center.y - 10),
+        ] {
+            let id = picture.ids[(y * SIZE[0] + x) as usize];
+            let Some(Hit::Splat { instance, point }) = scene.pick(x, y) else {
+                panic!("no splat at {x}, {y}")
+            };
+            assert_eq!(instance + 1, id, "at {x}, {y}");
+            assert!((point.length() - 1.0).abs() < 2e-3, "{point} is not on the sphere");
+            let seen = scene.camera.project(point, UVec2::from(SIZE).as_vec2()).unwrap();
+            assert!(
+                seen.distance(Vec2::new(x as f32, y as f32) + 0.5) < 0.01,
+                "{point} is seen at {seen}"
+            );
+        }
+        assert_eq!(scene.pick(0, 0), None);
+        // Past the picture: the pixel in its corner.
+        assert_eq!(scene.pick(u32::MAX, u32::MAX), None);
+    }
+}
+
+#[test]
+fn a_pick_never_falls_through_a_gap() {
+    // A front plate with gaps before a back plate without.
+    let mut front = Cloud::plate(60, -1.0, 1.0);
+    front.radii.fill(0.012);
+    let n_front = front.len();
+    let cloud = front.join(Cloud::plate(60, 0.5, 1.0));
+    let Some(mut scene) = Scene::new(&cloud) else { return };
+    let picture = scene.shoot();
+    let (mut n_gaps, mut n_picks) = (0, 0);
+    for y in (100..140).step_by(3) {
+        for x in (120..200).step_by(3) {
+            n_gaps += usize::from(picture.ids[(y * SIZE[0] + x) as usize] > n_front);
+            n_picks += 1;
+            match scene.pick(x, y) {
+                Some(Hit::Splat { instance, .. }) => assert!(instance < n_front, "the back is picked at {x}, {y}"),
+                other => panic!("{other:?} at {x}, {y}"),
+            }
+        }
+    }
+    assert!(
+        n_gaps > n_picks / 10,
+        "{n_gaps} gaps in {n_picks} picks: the test tests nothing"
+    );
+}
+
+#[test]
+fn pictures_are_drawn_on_change_alone() {
+    let cloud = Cloud::sphere(1_000, Vec3::ZERO, 1.0);
+    let Some(mut scene) = Scene::new(&cloud) else { return };
+    let check = |scene: &mut Scene, what: &str, changes: bool| {
+        assert_eq!(scene.draw(), changes, "{what}");
+        assert!(!scene.draw(), "again after {what}");
+    };
+    check(&mut scene, "first picture", true);
+    scene.turn(&[]);
+    scene.turn(&[7..7]);
+    scene.highlight(&[]);
+    scene.set_spheres(&[]);
+    check(&mut scene, "nothing", false);
+    scene.turn(&[1..2]);
+    check(&mut scene, "turn", true);
+    scene.highlight(&[4..8]);
+    check(&mut scene, "highlight", true);
+    scene.highlight(&[4..8]);
+    check(&mut scene, "same highlight", false);
+    scene.camera.orbit(Vec2::X);
+    check(&mut scene, "orbit", true);
+    scene.settings.palette = Palette::PAPER;
+    check(&mut scene, "palette", true);
+    scene.settings.mode = DisplayMode::Normals;
+    check(&mut scene, "mode", true);
+    scene.set_spheres(&[Sphere {
+        center: Vec3::ZERO,
+        color: [1.0; 3],
+        selected: false,
+    }]);
+    check(&mut scene, "spheres", true);
+    let number = scene.renderer.picture().unwrap().1;
+    let HeadlessDevice { device, queue, .. } = &scene.gpu;
+    assert!(
+        scene
+            .renderer
+            .draw(device, queue, &scene.camera, [100, 50], 1.0, &scene.settings)
+    );
+    assert_ne!(
+        scene.renderer.picture().unwrap().1,
+        number,
+        "another size is another texture"
+    );
+    scene.renderer.clear_cloud();
+    check(&mut scene, "no cloud", true);
+}
+
+#[test]
+fn a_stride_draws_each_sth_and_stays_closed() {
+    let cloud = Cloud::sphere(20_000, Vec3::ZERO, 1.0);
+    // Chunks that are no multiple of the stride.
+    for chunk_points in [usize::MAX, 1_001] {
+        let Some(mut scene) = Scene::with(&cloud, None, chunk_points) else {
+            return;
+        };
+        scene.settings.stride = 7;
+        // A lattice thinned in its own order is not even, so cover more.
+        scene.settings.splat_scale = 2.0;
+        let picture = scene.shoot();
+        assert!(picture.splats().all(|(instance, _)| instance % 7 == 0));
+        let mut drawn: Vec<u32> = picture.splats().map(|(instance, _)| instance).collect();
+        drawn.sort_unstable();
+        drawn.dedup();
+        assert!(drawn.len() > 1_000, "{} instances", drawn.len());
+        assert_eq!(picture.count_holes(), 0);
+    }
+}
+
+#[test]
+fn chunks_change_nothing() {
+    let cloud = Cloud::sphere(5_000, Vec3::ZERO, 1.0).join(Cloud::plate(40, -0.3, 0.9));
+    let Some(mut whole) = Scene::new(&cloud) else { return };
+    let Some(mut chunked) = Scene::with(&cloud, None, 700) else {
+        return;
+    };
+    for scene in [&mut whole, &mut chunked] {
+        scene.turn(&[650..1_500, 6_000..6_001]);
+        scene.highlight(&[690..710, 5_100..5_900]);
+    }
+    for mode in DisplayMode::ALL {
+        (whole.settings.mode, chunked.settings.mode) = (mode, mode);
+        assert!(whole.shoot() == chunked.shoot(), "{mode:?}");
+    }
+}
+
+#[test]
+fn spheres_are_seen_on_their_surface_and_picked_and_hidden_behind_others() {
+    let cloud = Cloud::sphere(20_000, Vec3::ZERO, 1.0);
+    let Some(mut scene) = Scene::new(&cloud) else { return };
+    let sphere = |center, selected| Sphere {
+        center,
+        color: [0.1, 0.9, 0.2],
+        selected,
+    };
+    let spheres = [
+        sphere(Vec3::NEG_Y, false),
+        sphere(Vec3::Y, false),
+        sphere(Vec3::new(0.6, -0.8, 0.0), true),
+    ];
+    scene.set_spheres(&spheres);
+    let picture = scene.shoot();
+    let count = |index: u32| picture.ids.iter().filter(|id| **id == ID_SPHERE | index).count();
+    // A disc of radius 5 pixels, and one of radius 8.5 with its ring.
+    assert!((70..=88).contains(&count(0)), "{}", count(0));
+    assert_eq!(count(1), 0, "the sphere on the far side shines through");
+    assert!((210..=245).contains(&count(2)), "{}", count(2));
+    let size = UVec2::from(SIZE).as_vec2();
+    for (index, mark) in [(0, &spheres[0]), (2, &spheres[2])] {
+        let at = scene.camera.project(mark.center, size).unwrap().as_uvec2();
+        let Some(Hit::Sphere { index: found, point }) = scene.pick(at.x, at.y) else {
+            panic!("no sphere at {at}")
+        };
+        assert_eq!(found, index);
+        assert!(point.distance(mark.center) < 0.1, "{point}");
+        let [red, green, blue] = picture.colors[(at.y * SIZE[0] + at.x) as usize];
+        assert!(green > 150 && red < 80 && blue < 80, "{red} {green} {blue}");
+    }
+}
+
+#[test]
+fn points_without_normals_are_gray_discs() {
+    let cloud = Cloud::sphere(20_000, Vec3::ZERO, 1.0);
+    let Some(mut scene) = Scene::new(&cloud) else { return };
+    let HeadlessDevice { device, queue, .. } = &scene.gpu;
+    scene
+        .renderer
+        .set_cloud(device, queue, &cloud.positions, None, &cloud.radii, None)
+        .unwrap();
+    let picture = scene.shoot();
+    assert!(picture.splats().count() > 10_000);
+    assert_eq!(picture.count_holes(), 0);
+    assert!(
+        picture
+            .splats()
+            .all(|(_, [red, green, blue])| red == green && green == blue)
+    );
+    scene.turn(&[0..20_000]);
+    assert!(scene.shoot() == picture, "there is nothing to turn");
+}
+
+#[test]
+fn the_order_maps_instances_to_points() {
+    let cloud = Cloud::sphere(3_000, Vec3::ZERO, 1.0);
+    let Some(mut scene) = Scene::new(&cloud) else { return };
+    let plain = scene.shoot();
+    let order: Vec<u32> = (0..cloud.len()).rev().collect();
+    let HeadlessDevice { device, queue, .. } = &scene.gpu;
+    let Cloud {
+        positions,
+        normals,
+        radii,
+    } = &cloud;
+    scene
+        .renderer
+        .set_cloud(device, queue, positions, Some(normals), radii, Some(&order))
+        .unwrap();
+    let turned_over = scene.shoot();
+    assert!(plain.colors == turned_over.colors);
+    for ((a, _), (b, _)) in plain.splats().zip(turned_over.splats()) {
+        assert_eq!(a, cloud.len() - 1 - b);
+    }
+}
+
+#[test]
+fn bad_slices_are_refused_in_words_and_leave_no_cloud() {
+    let cloud = Cloud::sphere(100, Vec3::ZERO, 1.0);
+    let Some(mut scene) = Scene::new(&cloud) else { return };
+    let HeadlessDevice { device, queue, .. } = &scene.gpu;
+    let error = scene
+        .renderer
+        .set_cloud(device, queue, &cloud.positions, None, &[1.0], None)
+        .unwrap_err();
+    assert!(
+        matches!(
+            error,
+            RenderError::Mismatch {
+                expected: 100,
+                found: 1,
+                ..
+            }
+        ),
+        "{error}"
+    );
+    assert_eq!(scene.shoot().splats().count(), 0);
+    // Nothing at all, points in one place, and lengths that are not finite draw without trouble.
+    let HeadlessDevice { device, queue, .. } = &scene.gpu;
+    scene
+        .renderer
+        .set_cloud(device, queue, &[], Some(&[]), &[], None)
+        .unwrap();
+    assert_eq!(scene.shoot().splats().count(), 0);
+    let HeadlessDevice { device, queue, .. } = &scene.gpu;
+    let radii = [0.0, f32::NAN, f32::INFINITY];
+    scene
+        .renderer
+        .set_cloud(device, queue, &[Vec3::ZERO; 3], Some(&[Vec3::ZERO; 3]), &radii, None)
+        .unwrap();
+    assert!(scene.shoot().splats().count() > 0);
+}
+
+#[test]
+fn opengl_draws_the_same_surfaces() {
+    let cloud = Cloud::sphere(20_000, Vec3::ZERO, 1.0);
+    let Some(mut scene) = Scene::with(&cloud, Some(wgpu::Backends::GL), 7_000) else {
+        return;
+    };
+    assert_eq!(scene.gpu.adapter.get_info().backend, wgpu::Backend::Gl);
+    let picture = scene.shoot();
+    let (front, all) = picture.count_front();
+    assert!(front == all && all > 10_000, "{front} of {all}");
+    assert_eq!(picture.count_holes(), 0);
+    scene.turn(&[0..cloud.len()]);
+    assert_eq!(scene.shoot().count_front().0, 0);
+    // The upper half of the picture shows the upper half of the sphere.
+    let up = scene
+        .camera
+        .project(Vec3::new(0.0, -0.6, 0.8), UVec2::from(SIZE).as_vec2())
+        .unwrap()
+        .as_uvec2();
+    let Some(Hit::Splat { point, .. }) = scene.pick(up.x, up.y) else {
+        panic!("no splat")
+    };
+    assert!(point.distance(Vec3::new(0.0, -0.6, 0.8)) < 0.02, "{point}");
+}

@@ -1,0 +1,102 @@
+//! Every shader passes naga's validation, and its structs lie in memory as their Rust twins do.
+
+use std::mem::{offset_of, size_of};
+
+use egui_wgpu::wgpu::naga;
+
+use crate::gpu_types::{Chunk, Frame, Look, Point, SphereMark};
+use crate::shader::{SHADE, SPHERE, SPLAT, Shader};
+
+/// A struct of Rust: its name, its size, its fields with their offsets.
+type Twin = (&'static str, usize, Vec<(&'static str, usize)>);
+
+macro_rules! twin {
+    ($name:ident: $($field:ident),+) => {
+        (stringify!($name), size_of::<$name>(), vec![$((stringify!($field), offset_of!($name, $field))),+])
+    };
+}
+
+fn twins() -> Vec<Twin> {
+    vec![
+        twin!(Frame: clip_from_eye, eye, perspective, right, pixel_len, back, max_radius, depth_from_clip,
+              scene_depth, size, pivot_depth, sphere_radius, line_width, stride),
+        twin!(Look: front, mode, back, n_highlights, background, pad_0, highlight, pad_1),
+        twin!(Chunk: first, pad_0, pad_1, pad_2),
+        twin!(Point: position, packed),
+        twin!(SphereMark: center, selected, color, pad_0),
+    ]
+}
+
+fn validate(name: &str, source: &str) -> Result<naga::Module, String> {
+    let module = naga::front::wgsl::parse_str(source).map_err(|e| e.emit_to_string_with_path(source, name))?;
+    let capabilities = naga::valid::Capabilities::empty();
+    naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities)
+        .validate(&module)
+        .map_err(|e| e.emit_to_string_with_path(source, name))?;
+    Ok(module)
+}
+
+/// The structs of a module that have a twin, in the twins' form.
+fn layouts(module: &naga::Module) -> Vec<(String, usize, Vec<(String, usize)>)> {
+    let known: Vec<&str> = twins().iter().map(|twin| twin.0).collect();
+    let structs = module.types.iter().filter_map(|(_, ty)| match (&ty.name, &ty.inner) {
+        (Some(name), naga::TypeInner::Struct { members, span }) if known.contains(&name.as_str()) => {
+            let fields = members
+                .iter()
+                .map(|m| (m.name.clone().unwrap(), m.offset as usize))
+                .collect();
+            Some((name.clone(), *span as usize, fields))
+        }
+        _ => None,
+    });
+    structs.collect()
+}
+
+#[test]
+fn shaders_are_valid_and_their_structs_match() {
+    let mut seen = Vec::new();
+    for Shader { name, source } in [SPLAT, SPHERE, SHADE] {
+        let module = validate(name, source).unwrap_or_else(|message| panic!("{name}: {message}"));
+        for (found, size, fields) in layouts(&module) {
+            let (_, expect_size, expect) = twins().into_iter().find(|twin| twin.0 == found).unwrap();
+            let expect: Vec<(String, usize)> = expect.into_iter().map(|(n, offset)| (n.to_owned(), offset)).collect();
+            assert_eq!((size, &fields), (expect_size, &expect), "{found} in {name}");
+            seen.push(found);
+        }
+    }
+    for (name, ..) in twins() {
+        assert!(seen.iter().any(|found| found == name), "{name} is in no shader");
+    }
+}
+
+#[test]
+fn constants_match() {
+    use crate::gpu_types as rust;
+    let module = validate("splat", SPLAT.source).unwrap();
+    let literal = |name: &str| {
+        let (_, constant) = module
+            .constants
+            .iter()
+            .find(|(_, c)| c.name.as_deref() == Some(name))
+            .unwrap();
+        match module.global_expressions[constant.init] {
+            naga::Expression::Literal(naga::Literal::U32(v)) => f64::from(v),
+            naga::Expression::Literal(naga::Literal::F32(v)) => f64::from(v),
+            ref other => panic!("{name} is {other:?}"),
+        }
+    };
+    let check = |name: &str, expect: f64| assert_eq!(literal(name), expect, "{name}");
+    check("ID_NONE", f64::from(rust::ID_NONE));
+    check("ID_SPHERE", f64::from(rust::ID_SPHERE));
+    check("OCT_MAX", f64::from(rust::OCT_MAX));
+    check("NO_NORMAL", f64::from(rust::NO_NORMAL));
+    check("RADIUS_CODE_MAX", f64::from(rust::RADIUS_CODE_MAX));
+    check("RADIUS_CODES_PER_OCTAVE", f64::from(rust::RADIUS_CODES_PER_OCTAVE));
+}
+
+#[test]
+fn validation_can_fail() {
+    let broken = SHADE.source.replace("background(position.y)", "background(position)");
+    assert_ne!(broken, SHADE.source);
+    assert!(validate("broken", &broken).unwrap_err().contains("background"));
+}

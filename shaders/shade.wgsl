@@ -1,0 +1,150 @@
+// Shade pass: what is seen at each pixel becomes a color. Colors are gamma-encoded, as displayed.
+
+const MODE_NORMALS: u32 = 1u;
+
+// Darkness of creases and of what lies behind an edge.
+const CREASE_STRENGTH: f32 = 60.0;
+const CREASE_LIMIT: f32 = 0.008;
+
+struct Look {
+    front: vec3<f32>,
+    mode: u32,
+    back: vec3<f32>,
+    n_highlights: u32,
+    background: vec3<f32>,
+    pad_0: u32,
+    highlight: vec3<f32>,
+    pad_1: u32,
+}
+
+@group(0) @binding(1) var<storage, read> spheres: array<SphereMark>;
+@group(1) @binding(0) var<uniform> look: Look;
+// One bit per instance: turned or not.
+@group(1) @binding(1) var<storage, read> turned: array<u32>;
+// First and end of each highlighted range, ascending.
+@group(1) @binding(2) var<storage, read> highlights: array<vec2<u32>>;
+@group(1) @binding(3) var seen: texture_2d<u32>;
+@group(1) @binding(4) var surfaces: texture_2d<u32>;
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
+    let corner = vec2<f32>(f32((index << 1u) & 2u), f32(index & 2u));
+    return vec4<f32>(corner * 2.0 - 1.0, 0.0, 1.0);
+}
+
+fn is_splat(id: u32) -> bool {
+    return id != ID_NONE && (id & ID_SPHERE) == 0u;
+}
+
+fn is_highlighted(id: u32) -> bool {
+    if !is_splat(id) {
+        return false;
+    }
+    let instance = id - 1u;
+    // Binary search for the number of ranges that start at or before the instance.
+    var low = 0u;
+    var high = look.n_highlights;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if highlights[middle].x <= instance {
+            low = middle + 1u;
+        } else {
+            high = middle;
+        }
+    }
+    return low > 0u && instance < highlights[low - 1u].y;
+}
+
+fn is_turned(instance: u32) -> bool {
+    return ((turned[instance / 32u] >> (instance % 32u)) & 1u) != 0u;
+}
+
+fn depth_of(bits: u32) -> f32 {
+    let z = bitcast<f32>(bits);
+    let a = frame.depth_from_clip;
+    return (a.x + a.y * z) / (a.z + a.w * z);
+}
+
+// Depth on a scale on which equal steps look equally deep.
+fn visual_depth(bits: u32) -> f32 {
+    let depth = depth_of(bits);
+    if frame.perspective > 0.5 {
+        return log2(depth);
+    }
+    return depth / frame.pivot_depth;
+}
+
+// How far a pixel lies behind the line between its two neighbors; 0 for planes at any angle.
+fn crease(here: f32, a: vec2<u32>, b: vec2<u32>) -> f32 {
+    let before = select(here, visual_depth(a.y), a.x != ID_NONE);
+    let after = select(here, visual_depth(b.y), b.x != ID_NONE);
+    return clamp(2.0 * here - before - after, 0.0, CREASE_LIMIT);
+}
+
+fn background(y: f32) -> vec3<f32> {
+    return look.background * mix(1.0, 0.88, y / frame.size.y);
+}
+
+fn sphere_color(id: u32, surface: u32) -> vec3<f32> {
+    let sphere = spheres[id & ~ID_SPHERE];
+    let selected = sphere.selected != 0u;
+    let r = length(unpack2x16snorm(surface)) * select(1.0, SELECTED_RADIUS, selected);
+    if selected && r > 1.0 {
+        // Dark, light, dark: visible on any ground.
+        let ring = (r - 1.0) / (SELECTED_RADIUS - 1.0);
+        return select(vec3<f32>(0.06), vec3<f32>(1.0), ring > 0.3 && ring < 0.8);
+    }
+    let light = mix(0.62, 1.0, sqrt(max(1.0 - r * r, 0.0)));
+    let rim = smoothstep(0.72, 0.86, r);
+    return sphere.color * light * mix(1.0, 0.22, rim);
+}
+
+fn splat_color(instance: u32, surface: u32, depth: f32) -> vec3<f32> {
+    if !has_normal(surface) {
+        let far = (depth - frame.scene_depth.x) / max(frame.scene_depth.y - frame.scene_depth.x, 1e-30);
+        return vec3<f32>(mix(0.86, 0.42, clamp(far, 0.0, 1.0)));
+    }
+    let turn = is_turned(instance);
+    if look.mode == MODE_NORMALS {
+        let normal = unpack_normal(surface & NORMAL_BITS);
+        return select(normal, -normal, turn) * 0.5 + 0.5;
+    }
+    let code = surface >> 22u;
+    let cosine = f32(code & 511u) / 511.0;
+    let is_front = (code < 512u) != turn;
+    // Headlight.
+    return select(look.back, look.front, is_front) * mix(0.34, 1.0, cosine);
+}
+
+@fragment
+fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
+    let pixel = vec2<i32>(position.xy);
+    let here = textureLoad(seen, pixel, 0).xy;
+    if here.x == ID_NONE {
+        return vec4<f32>(background(position.y), 1.0);
+    }
+    let surface = textureLoad(surfaces, pixel, 0).x;
+    if !is_splat(here.x) {
+        return vec4<f32>(sphere_color(here.x, surface), 1.0);
+    }
+
+    let reach = i32(max(round(frame.line_width), 1.0));
+    let last = vec2<i32>(frame.size) - 1;
+    let left = textureLoad(seen, vec2<i32>(max(pixel.x - reach, 0), pixel.y), 0).xy;
+    let right = textureLoad(seen, vec2<i32>(min(pixel.x + reach, last.x), pixel.y), 0).xy;
+    let above = textureLoad(seen, vec2<i32>(pixel.x, max(pixel.y - reach, 0)), 0).xy;
+    let below = textureLoad(seen, vec2<i32>(pixel.x, min(pixel.y + reach, last.y)), 0).xy;
+
+    let depth = visual_depth(here.y);
+    let dark = crease(depth, left, right) + crease(depth, above, below);
+    var color = splat_color(here.x - 1u, surface, depth_of(here.y)) * exp(-CREASE_STRENGTH * dark);
+
+    if look.n_highlights > 0u && is_highlighted(here.x) {
+        color = mix(color, look.highlight, 0.55);
+        let inside = is_highlighted(left.x) && is_highlighted(right.x) && is_highlighted(above.x) && is_highlighted(below.x);
+        if !inside {
+            color = mix(look.highlight, vec3<f32>(1.0), 0.45);
+        }
+    }
+    return vec4<f32>(color, 1.0);
+}
