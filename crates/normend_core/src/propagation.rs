@@ -69,11 +69,13 @@ impl Parameters {
 }
 
 impl Default for Parameters {
+    /// OBNE over 12 neighbors, graph of 6. With larger neighborhoods the graph links the two sides of thin walls, where the
+    /// dot product goes wrong; with smaller ones noise does.
     fn default() -> Self {
         Self {
             estimator: Estimator::Obne,
             k_normals: 12,
-            k_graph: 8,
+            k_graph: 6,
             edge_rule: EdgeRule::Dot,
             start: Start::Estimate,
         }
