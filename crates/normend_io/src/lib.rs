@@ -407,6 +407,15 @@ pub fn write_points(
     })
 }
 
+/// Writes `bytes` to `path` as [`Scan::write`] writes scans, whole or not at all: for pictures and the like. A file that is
+/// there is replaced.
+///
+/// # Errors
+/// [`WriteError`]; the target is as it was then.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    save::replace(path, |out| out.write_all(bytes).map_err(WriteError::io(path)))
+}
+
 impl fmt::Debug for Scan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Scan")
