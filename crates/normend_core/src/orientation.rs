@@ -101,13 +101,22 @@ mod tests {
     #[test]
     fn flips_cancel_and_join() {
         check(&[], &[]);
-        check(&[3..3], &[]);
-        check(&[2..5, 2..5], &[]);
-        check(&[5..9, 2..5], &[2..9]);
-        check(&[0..10, 3..4], &[0..3, 4..10]);
+        check(&[(3, 3)], &[]);
+        check(&[(2, 5), (2, 5)], &[]);
+        check(&[(5, 9), (2, 5)], &[(2, 9)]);
+        check(&[(0, 10), (3, 4)], &[(0, 3), (4, 10)]);
 
-        fn check(flips: &[Range<u32>], expect: &[Range<u32>]) {
-            assert_eq!(Change::from_flips(flips).ranges(), expect);
+        fn check(flips: &[(u32, u32)], expect: &[(u32, u32)]) {
+            let flips: Vec<_> = flips.iter().map(|&(start, end)| start..end).collect();
+            let change = Change::from_flips(&flips);
+            assert_eq!(
+                change
+                    .ranges()
+                    .iter()
+                    .map(|range| (range.start, range.end))
+                    .collect::<Vec<_>>(),
+                expect
+            );
         }
     }
 

@@ -133,8 +133,8 @@ impl Regions {
             let position = self.tree.position(point);
             match turned {
                 Some(turned) => {
-                    self.admit(position);
-                    wanted.insert(position, turned);
+                    let top = self.admit(position);
+                    wanted.insert(position, (turned, top));
                 }
                 None => {
                     self.dismiss(position, &mut flips);
@@ -142,9 +142,12 @@ impl Regions {
                 }
             }
         }
-        for (position, turned) in wanted {
+        for (position, (turned, top)) in wanted {
             if self.orientation.is_turned(position) != turned {
-                self.flip(self.top_of(position), &mut flips);
+                // A later cut or merge may have given the source another top.
+                let is_still_top = self.source_by_top.get(&top) == Some(&position);
+                let top = if is_still_top { top } else { self.top_of(position) };
+                self.flip(top, &mut flips);
             }
         }
         Change::from_flips(&flips)
@@ -205,22 +208,22 @@ impl Regions {
         heaviest
     }
 
-    /// Makes `position` a source: one cut at most, no sign changes.
-    fn admit(&mut self, position: u32) {
-        match self.part(position) {
-            Part::Whole { top } => {
-                self.source_by_top.insert(top, position);
-            }
+    /// Makes `position` a source, with one cut at most and without turning anything; returns the top of its region.
+    fn admit(&mut self, position: u32) -> u32 {
+        let top = match self.part(position) {
+            Part::Whole { top } => top,
             Part::Below { cut } => {
                 self.tops.insert(cut);
-                self.source_by_top.insert(cut, position);
+                cut
             }
             Part::Above { top, cut, old } => {
                 self.tops.insert(cut);
                 self.source_by_top.insert(cut, old);
-                self.source_by_top.insert(top, position);
+                top
             }
-        }
+        };
+        self.source_by_top.insert(top, position);
+        top
     }
 
     /// Takes the source at `position` away, if it is one; its region joins the neighbor over the lightest cut and takes its

@@ -29,8 +29,11 @@ fn regions_of(world: &World) -> Regions {
     Regions::new(Arc::clone(&world.tree), &world.initial_cuts, &world.initially_turned)
 }
 
-/// A world and edits of its sources, in batches.
-fn worlds_and_batches() -> impl Strategy<Value = (World, Vec<Vec<(u32, Option<bool>)>>)> {
+/// As [`Regions::set`] takes it.
+type Batch = Vec<(u32, Option<bool>)>;
+
+/// A world and edits of its sources.
+fn worlds_and_batches() -> impl Strategy<Value = (World, Vec<Batch>)> {
     (1_usize..40).prop_flat_map(|n_points| {
         let edit = (
             0..n_points as u32,

@@ -1,0 +1,182 @@
+//! How long a click takes: `Edit::Mend` with its undo, and its preview, among standing sources.
+//!
+//! Criterion gives means; the tail is what a user feels, so the percentiles of many single clicks are printed too.
+//! Picks are random, which is harder than a user's: most of them split a large right region somewhere in its middle.
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use fixedbitset::FixedBitSet;
+use glam::{DVec3, Vec3};
+use normend_core::sources::Origin;
+use normend_core::{
+    Document, Edit, Parameters, PointCloud, Propagation, RiemannianGraph, Silent, Source, SpanningTree,
+};
+
+/// Random numbers: SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators").
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = self.0;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        bits ^ (bits >> 31)
+    }
+
+    fn below(&mut self, end: usize) -> u32 {
+        (self.next() % end as u64) as u32
+    }
+}
+
+/// A square sheet of `side × side` points, each joined to its eight neighbors by random weights: rougher than any scan,
+/// with the deep tree of a large one. The parent edge of one position in `cut_every` is an initial cut.
+fn sheet(side: usize, cut_every: usize) -> Document {
+    let n_points = side * side;
+    let mut random = Random(1);
+    let mut edges = Vec::with_capacity(4 * n_points);
+    for row in 0..side {
+        for column in 0..side {
+            for (down, right) in [(0, 1), (1, 0), (1, 1), (1, -1)] {
+                let (other_row, other_column) = (row + down, column.wrapping_add_signed(right));
+                if other_row < side && other_column < side {
+                    let ends = [row * side + column, other_row * side + other_column].map(|end| end as u32);
+                    let bits = random.next();
+                    edges.push((
+                        ends[0],
+                        ends[1],
+                        (bits >> 40) as f32 / (1_u64 << 24) as f32,
+                        bits & 1 == 1,
+                    ));
+                }
+            }
+        }
+    }
+    let Ok(tree) = SpanningTree::new(&RiemannianGraph::from_edges(n_points, &edges), &Silent) else {
+        unreachable!("silent progress never cancels")
+    };
+    let mut initial_cuts = FixedBitSet::with_capacity(n_points);
+    for position in 1..n_points {
+        initial_cuts.set(position, random.below(cut_every) == 0);
+    }
+    let positions = (0..n_points)
+        .map(|point| Vec3::new((point % side) as f32, (point / side) as f32, 0.0))
+        .collect();
+    let Ok(cloud) = PointCloud::new(DVec3::ZERO, positions) else {
+        unreachable!("the sheet is finite and small")
+    };
+    let mut document = Document::new(Arc::new(cloud), None);
+    document.install(Propagation {
+        parameters: Parameters::default(),
+        normals: Arc::new(vec![Vec3::Z; n_points]),
+        splat_radii: Arc::new(vec![1.0; n_points]),
+        tree: Arc::new(tree),
+        initial_cuts,
+        initially_turned: FixedBitSet::with_capacity(n_points),
+        seconds: Vec::new(),
+    });
+    document
+}
+
+fn apply(document: &mut Document, edit: Edit) {
+    let Ok(change) = document.apply(edit) else {
+        unreachable!("the points exist")
+    };
+    black_box(change);
+}
+
+fn preview(document: &Document, point: u32) {
+    let Ok(change) = document.preview_mend(point) else {
+        unreachable!("the point exists")
+    };
+    black_box(change);
+}
+
+/// How long `act` takes.
+fn time(act: impl FnOnce()) -> Duration {
+    let start = Instant::now();
+    act();
+    start.elapsed()
+}
+
+/// Prints single times by percentile.
+fn print_percentiles(what: &str, mut times: Vec<Duration>) {
+    times.sort_unstable();
+    let percentile = |percent: usize| times[(times.len() - 1) * percent / 100];
+    println!(
+        "  {what:8} p50 {:>9.1?}  p99 {:>9.1?}  max {:>9.1?}",
+        percentile(50),
+        percentile(99),
+        percentile(100)
+    );
+}
+
+fn time_clicks(document: &mut Document, random: &mut Random) {
+    const N_CLICKS: usize = 10_000;
+    let n_points = document.cloud().n_points();
+    let [mut previews, mut mends, mut undos] = [(); 3].map(|()| Vec::with_capacity(N_CLICKS));
+    for _ in 0..N_CLICKS {
+        let point = random.below(n_points);
+        previews.push(time(|| preview(document, point)));
+        mends.push(time(|| apply(document, Edit::Mend(point))));
+        undos.push(time(|| drop(black_box(document.undo()))));
+    }
+    println!("  of {N_CLICKS} single clicks:");
+    print_percentiles("preview", previews);
+    print_percentiles("mend", mends);
+    print_percentiles("undo", undos);
+}
+
+fn time_batch(document: &mut Document, random: &mut Random) {
+    const N_SOURCES: usize = 10_000;
+    let n_points = document.cloud().n_points();
+    let source = |_| {
+        let normal = if random.next() & 1 == 1 { Vec3::Z } else { -Vec3::Z };
+        Source {
+            point: random.below(n_points),
+            normal,
+            origin: Origin::Picked,
+        }
+    };
+    let sources = (0..N_SOURCES).map(source).collect();
+    let add = time(|| apply(document, Edit::AddSources(sources)));
+    let undo = time(|| drop(black_box(document.undo())));
+    println!("  a batch of {N_SOURCES} sources: {add:.1?}, undone in {undo:.1?}");
+}
+
+fn click(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("click");
+    for (side, cut_every) in [(1000, usize::MAX), (1000, 10), (2237, usize::MAX)] {
+        let mut document = sheet(side, cut_every);
+        let n_points = document.cloud().n_points();
+        let n_cuts = document
+            .propagation()
+            .map_or(0, |propagation| propagation.initial_cuts.count_ones(..));
+        let mut random = Random(2);
+        for n_sources in [1, 1000] {
+            while document.sources().len() < n_sources {
+                apply(&mut document, Edit::Mend(random.below(n_points)));
+            }
+            let setting = format!("{n_points} points, {n_cuts} initial cuts, {n_sources} sources");
+            println!("\n{setting}");
+            time_clicks(&mut document, &mut random);
+            time_batch(&mut document, &mut random);
+            group.bench_function(format!("preview/{setting}"), |bencher| {
+                bencher.iter(|| preview(&document, random.below(n_points)));
+            });
+            group.bench_function(format!("mend and undo/{setting}"), |bencher| {
+                bencher.iter(|| {
+                    apply(&mut document, Edit::Mend(random.below(n_points)));
+                    black_box(document.undo())
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, click);
+criterion_main!(benches);
