@@ -1,12 +1,26 @@
-//! The editor: the only place where core, io and render meet.
+//! The Normend editor: the only place where orientation, files and graphics meet.
+//!
+//! A frame is: take results of jobs, draw, take commands, act ([`app`]). Long work runs in jobs and never in a frame.
+//! The document changes only through its edits; [`scene_sync`] alone tells the renderer what turned.
+//!
+//! Not here: how normals are oriented, how files are read, how splats are drawn.
 
-use std::path::PathBuf;
+mod actions;
+pub mod app;
+pub mod command;
+mod dialogs;
+pub mod job;
+pub mod messages;
+pub mod panels;
+mod run;
+pub mod scene_sync;
+pub mod session;
+pub mod settings;
+pub mod theme;
+pub mod tools;
+pub mod viewport;
+mod work;
 
-/// Opens the editor's window, with `scan` when one is given, and runs until it is closed.
-///
-/// # Errors
-/// In words for the user: no display, no graphics driver, and the package that gives it.
-pub fn run(scan: Option<PathBuf>) -> anyhow::Result<()> {
-    let _ = scan;
-    unimplemented!()
-}
+pub use app::App;
+pub use run::{graphics_setup, run};
+pub use settings::SettingsStore;

@@ -1,0 +1,406 @@
+//! What the editor does when it is asked, and what it does with the results of jobs and dialogs.
+
+use std::time::Duration;
+
+use normend_core::{Document, Edit};
+use normend_render::DisplayMode;
+
+use crate::app::{App, Leaving};
+use crate::command::{Action, Command};
+use crate::dialogs::{DialogAnswer, DialogPurpose};
+use crate::job::JobError;
+use crate::panels::export::ExportWindow;
+use crate::panels::open_path::OpenPathWindow;
+use crate::session::Session;
+use crate::settings::SPLAT_SCALES;
+use crate::theme;
+use crate::work::{ScanOrigin, Work};
+
+const ZOOM_STEP: f32 = 1.25;
+/// Pointer motion that one press of an arrow key stands for, in points.
+const ORBIT_STEP: f32 = 24.0;
+const SPLAT_STEP: f32 = 1.15;
+
+impl App {
+    /// Says whether `command` can be run now, and if not, why.
+    pub fn availability(&self, command: Command) -> Result<(), &'static str> {
+        let exporting = matches!(self.work, Some(Work::Export { .. }));
+        let document = self.document();
+        let is_oriented = document.is_some_and(|document| document.orientation().is_some());
+        let n_selected = self.session.as_ref().map_or(0, |session| session.selected.len());
+        let check = |holds: bool, reason| if holds { Ok(()) } else { Err(reason) };
+        match command {
+            Command::Open | Command::OpenPath | Command::OpenSample => check(!exporting, "an export is being written"),
+            Command::Export => {
+                check(document.is_some(), "no scan is open")?;
+                check(self.work.is_none(), "wait for the running work, or cancel it")?;
+                check(is_oriented, "the scan is not oriented yet")
+            }
+            Command::Propagate => {
+                check(document.is_some(), "no scan is open")?;
+                check(!exporting, "an export is being written")?;
+                check(
+                    !matches!(self.work, Some(Work::Open { .. })),
+                    "another scan is being opened",
+                )
+            }
+            Command::Undo => check(
+                document.and_then(Document::next_undo).is_some(),
+                "there is nothing to undo",
+            ),
+            Command::Redo => check(
+                document.and_then(Document::next_redo).is_some(),
+                "there is nothing to redo",
+            ),
+            Command::MendHere => check(is_oriented, "the scan is not oriented yet"),
+            Command::SelectAllSources => check(
+                document.is_some_and(|document| !document.sources().is_empty()),
+                "there are no sources",
+            ),
+            Command::FlipSources | Command::RemoveSources => check(n_selected > 0, "no source is selected"),
+            Command::FrameAll
+            | Command::SetPivot
+            | Command::View(_)
+            | Command::ToggleOrthographic
+            | Command::ZoomIn
+            | Command::ZoomOut
+            | Command::OrbitLeft
+            | Command::OrbitRight
+            | Command::OrbitUp
+            | Command::OrbitDown
+            | Command::LargerSplats
+            | Command::SmallerSplats
+            | Command::NextDisplayMode => check(document.is_some(), "no scan is open"),
+            Command::Quit | Command::Cancel | Command::Shortcuts | Command::Log | Command::About => Ok(()),
+        }
+    }
+
+    /// Does what was asked for.
+    pub fn act(&mut self, action: Action) {
+        match action {
+            Action::Run(command) => self.run(command),
+            Action::OpenScan(path) => self.leave(Leaving::Open(ScanOrigin::File(path))),
+            Action::ClearRecent => self.settings.settings.recent.clear(),
+            Action::Propagate(parameters) => {
+                if let Some(session) = &mut self.session {
+                    session.draft = parameters;
+                    session.requested = parameters;
+                    self.work = Some(Work::propagate(&self.ctx, &session.document, parameters));
+                }
+            }
+            Action::SelectSource { point, extend } => self.select(point, extend),
+            Action::FlyTo(point) => {
+                if let Some(cloud) = self.document().map(|document| document.cloud().clone())
+                    && let Some(&position) = cloud.positions().get(point as usize)
+                {
+                    self.viewport.fly_to(position, cloud.diagonal() * 0.25);
+                }
+            }
+            Action::FlipSources(points) => self.apply_edit(Edit::FlipSources(points)),
+            Action::RemoveSources(points) => self.apply_edit(Edit::RemoveSources(points)),
+            Action::CancelJob => {
+                if let Some(work) = &self.work {
+                    work.cancel();
+                }
+            }
+            Action::BrowseExport => {
+                if let Some(window) = &self.windows.export {
+                    self.dialogs.pick_target(&self.ctx, std::path::Path::new(window.path()));
+                }
+            }
+            Action::ExportTo { path, overwrite_input } => {
+                let Some(session) = &self.session else { return };
+                // A relative path means the folder that the editor was started in; the message names it in full.
+                let path = std::path::absolute(&path).unwrap_or(path);
+                self.work = Work::export(&self.ctx, session, &path, overwrite_input);
+            }
+        }
+    }
+
+    fn run(&mut self, command: Command) {
+        match command {
+            Command::Open => self
+                .dialogs
+                .pick_scan(&self.ctx, self.settings.settings.open_folder.as_deref()),
+            Command::OpenPath => self.windows.open_path = Some(OpenPathWindow::new(None)),
+            Command::OpenSample => self.leave(Leaving::Open(ScanOrigin::Sample)),
+            Command::Export => {
+                if let Some(session) = &self.session {
+                    let suggested = session.suggested_export(self.settings.settings.export_folder.as_deref());
+                    self.windows.export = Some(ExportWindow::new(&suggested, session.scan.path().cloned()));
+                }
+            }
+            Command::Quit => self.ctx.send_viewport_cmd(egui::ViewportCommand::Close),
+            Command::Undo => self.step_history(Session::undo),
+            Command::Redo => self.step_history(Session::redo),
+            Command::MendHere => {
+                let pixel = self.meant_pixel();
+                let event = self
+                    .scene
+                    .as_ref()
+                    .and_then(|scene| self.mend.click(scene, pixel, false));
+                self.handle(event);
+            }
+            Command::SetPivot => {
+                let pixel = self.meant_pixel();
+                let event = self.scene.as_ref().and_then(|scene| self.mend.pivot(scene, pixel));
+                self.handle(event);
+            }
+            Command::SelectAllSources => {
+                if let Some(session) = &mut self.session {
+                    session.selected = session.document.sources().iter().map(|source| source.point).collect();
+                }
+                self.show_sources();
+            }
+            Command::FlipSources => self.act(Action::FlipSources(self.selected_points())),
+            Command::RemoveSources => self.act(Action::RemoveSources(self.selected_points())),
+            Command::Propagate => {
+                if let Some(parameters) = self.session.as_ref().map(|session| session.draft) {
+                    self.act(Action::Propagate(parameters));
+                }
+            }
+            Command::Cancel => self.cancel(),
+            Command::FrameAll => {
+                if let Some(session) = &self.session {
+                    self.viewport.frame_all(session.document.cloud());
+                }
+            }
+            Command::View(view) => self.viewport.camera.set_view(view),
+            Command::ToggleOrthographic => self.viewport.toggle_orthographic(),
+            Command::ZoomIn => self.viewport.zoom(ZOOM_STEP),
+            Command::ZoomOut => self.viewport.zoom(1.0 / ZOOM_STEP),
+            Command::OrbitLeft => self.viewport.orbit(egui::Vec2::new(-ORBIT_STEP, 0.0)),
+            Command::OrbitRight => self.viewport.orbit(egui::Vec2::new(ORBIT_STEP, 0.0)),
+            Command::OrbitUp => self.viewport.orbit(egui::Vec2::new(0.0, -ORBIT_STEP)),
+            Command::OrbitDown => self.viewport.orbit(egui::Vec2::new(0.0, ORBIT_STEP)),
+            Command::LargerSplats => self.scale_splats(SPLAT_STEP),
+            Command::SmallerSplats => self.scale_splats(1.0 / SPLAT_STEP),
+            Command::NextDisplayMode => {
+                let all = DisplayMode::ALL;
+                let at = all.iter().position(|&mode| mode == self.mode).unwrap_or_default();
+                self.mode = all[(at + 1) % all.len()];
+            }
+            Command::Shortcuts => self.windows.shortcuts = !self.windows.shortcuts,
+            Command::Log => self.windows.log = !self.windows.log,
+            Command::About => self.windows.about = !self.windows.about,
+        }
+    }
+
+    fn scale_splats(&mut self, factor: f32) {
+        let scale = &mut self.settings.settings.splat_scale;
+        *scale = (*scale * factor).clamp(*SPLAT_SCALES.start(), *SPLAT_SCALES.end());
+    }
+
+    /// Escape: the first of these that applies.
+    fn cancel(&mut self) {
+        let windows = &mut self.windows;
+        if windows.unsaved.take().is_some() || windows.open_path.take().is_some() {
+            return;
+        }
+        if windows.export.take().is_some() {
+            self.after_export = None;
+        } else if windows.shortcuts || windows.about || windows.log {
+            (windows.shortcuts, windows.about, windows.log) = (false, false, false);
+        } else if let Some(work) = &self.work {
+            work.cancel();
+        } else {
+            self.deselect();
+        }
+    }
+
+    fn selected_points(&self) -> Vec<u32> {
+        self.session
+            .iter()
+            .flat_map(|session| session.selected.iter().copied())
+            .collect()
+    }
+
+    fn select(&mut self, point: u32, extend: bool) {
+        if let Some(session) = &mut self.session {
+            if !extend {
+                session.selected.clear();
+            }
+            if !session.selected.remove(&point) {
+                session.selected.insert(point);
+            }
+        }
+        self.show_sources();
+    }
+
+    pub(crate) fn deselect(&mut self) {
+        if let Some(session) = &mut self.session {
+            session.selected.clear();
+        }
+        self.show_sources();
+    }
+
+    fn show_sources(&mut self) {
+        if let (Some(scene), Some(session)) = (&mut self.scene, &self.session) {
+            scene.show_sources(session);
+        }
+    }
+
+    pub(crate) fn apply_edit(&mut self, edit: Edit) {
+        let Some(session) = &mut self.session else { return };
+        match session.apply(edit) {
+            Ok(change) => {
+                if let Some(scene) = &mut self.scene {
+                    scene.apply(&change, session);
+                }
+            }
+            Err(error) => self.messages.error(format!("This edit was not applied: {error}.")),
+        }
+    }
+
+    fn step_history(&mut self, step: impl FnOnce(&mut Session) -> Option<normend_core::Change>) {
+        let Some(session) = &mut self.session else { return };
+        if let Some(change) = step(session)
+            && let Some(scene) = &mut self.scene
+        {
+            scene.apply(&change, session);
+        }
+    }
+
+    /// Leaves the document behind, after asking if it has mends that no exported file has.
+    fn leave(&mut self, leaving: Leaving) {
+        if self.is_unsaved() {
+            self.windows.unsaved = Some(leaving);
+        } else {
+            self.leave_now(leaving);
+        }
+    }
+
+    pub(crate) fn leave_now(&mut self, leaving: Leaving) {
+        match leaving {
+            Leaving::Quit => {
+                self.quitting = true;
+                self.ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+            }
+            Leaving::Open(origin) => self.open(origin),
+        }
+    }
+
+    /// Starts to read a scan; the present one stays until that succeeds.
+    pub(crate) fn open(&mut self, origin: ScanOrigin) {
+        if let Err(reason) = self.availability(Command::Open) {
+            self.messages
+                .error(format!("{} was not opened: {reason}.", origin.name()));
+            return;
+        }
+        // A job that runs is dropped here, so its result cannot arrive.
+        self.work = Some(Work::open(&self.ctx, origin));
+    }
+
+    pub(crate) fn take_dialogs(&mut self) {
+        while let Some((purpose, answer)) = self.dialogs.poll() {
+            let note = "This system shows no file dialog (it needs a desktop portal or zenity). Type the path instead.";
+            match (purpose, answer) {
+                (_, DialogAnswer::Cancelled) => {}
+                (DialogPurpose::Open, DialogAnswer::Picked(path)) => self.act(Action::OpenScan(path)),
+                (DialogPurpose::Open, DialogAnswer::Unavailable) => {
+                    self.windows.open_path = Some(OpenPathWindow::new(Some(note.to_owned())));
+                }
+                (DialogPurpose::Export, DialogAnswer::Picked(path)) => {
+                    if let Some(window) = &mut self.windows.export {
+                        window.set_path(&path);
+                    }
+                }
+                (DialogPurpose::Export, DialogAnswer::Unavailable) => self.messages.info(note),
+            }
+        }
+    }
+
+    pub(crate) fn take_work(&mut self) {
+        match self.work.take() {
+            None => {}
+            Some(Work::Open { job, origin }) => match job.poll() {
+                None => self.work = Some(Work::Open { job, origin }),
+                Some(Ok(scan)) => self.show_scan(scan, &origin),
+                Some(Err(error)) => self.say_why(&format!("{} was not opened", origin.name()), error),
+            },
+            Some(Work::Propagate(job)) => match job.poll() {
+                None => self.work = Some(Work::Propagate(job)),
+                Some(Ok(propagation)) => self.install(propagation),
+                Some(Err(error)) => {
+                    self.say_why("The scan was not oriented", error);
+                    if let Some(session) = &mut self.session
+                        && session.document.propagation().is_some()
+                    {
+                        session.requested = session.document.parameters();
+                    }
+                }
+            },
+            Some(Work::Export { job, path, revision }) => match job.poll() {
+                None => self.work = Some(Work::Export { job, path, revision }),
+                Some(Ok(())) => {
+                    self.settings.settings.export_folder = path.parent().map(std::path::Path::to_path_buf);
+                    if let Some(session) = &mut self.session {
+                        session.mark_saved(revision);
+                        let n_points = theme::counted(session.scan.cloud.n_points() as u64, "point", "points");
+                        self.messages
+                            .info(format!("Exported {n_points} to {}.", path.display()));
+                    }
+                    if let Some(leaving) = self.after_export.take() {
+                        self.leave(leaving);
+                    }
+                }
+                Some(Err(error)) => {
+                    self.after_export = None;
+                    self.say_why("Nothing was exported", error);
+                }
+            },
+        }
+    }
+
+    fn say_why(&mut self, what: &str, error: JobError) {
+        match error {
+            JobError::Cancelled => self.messages.info(format!("{what}: cancelled.")),
+            JobError::Failed(reason) => {
+                let stop = if reason.ends_with('.') { "" } else { "." };
+                self.messages.error(format!("{what}: {reason}{stop}"));
+            }
+        }
+    }
+
+    fn show_scan(&mut self, scan: normend_io::Scan, origin: &ScanOrigin) {
+        if let ScanOrigin::File(path) = origin {
+            self.settings.settings.remember_scan(path);
+        }
+        let session = Session::new(scan, origin.name());
+        self.viewport.look_at(session.document.cloud());
+        self.clicked_revision = None;
+        if let Some(scene) = &mut self.scene {
+            self.mend.reset(scene);
+            if let Err(error) = scene.show_points(session.document.cloud()) {
+                self.messages
+                    .error(format!("The scan is open but cannot be shown: {error}."));
+            }
+        }
+        if session.scan.n_left_out > 0 {
+            let rows = theme::counted(session.scan.n_left_out as u64, "row", "rows");
+            self.messages.info(format!(
+                "{rows} with a coordinate that is not finite are left out; they stay in the file."
+            ));
+        }
+        let parameters = session.draft;
+        self.session = Some(session);
+        self.act(Action::Propagate(parameters));
+    }
+
+    fn install(&mut self, propagation: normend_core::Propagation) {
+        let Some(session) = &mut self.session else { return };
+        let secs: f64 = propagation.seconds.iter().map(|(_, secs)| secs).sum();
+        session.document.install(propagation);
+        session.requested = session.document.parameters();
+        if let Some(scene) = &mut self.scene {
+            self.mend.reset(scene);
+            if let Err(error) = scene.show_document(session) {
+                self.messages
+                    .error(format!("The scan is oriented but cannot be shown: {error}."));
+            }
+        }
+        let n_points = theme::counted(session.scan.cloud.n_points() as u64, "point", "points");
+        let time = Duration::from_secs_f64(secs.max(0.0)).as_secs_f32();
+        self.messages.info(format!("Oriented {n_points} in {time:.1} s."));
+    }
+}

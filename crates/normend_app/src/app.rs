@@ -1,0 +1,508 @@
+//! The editor's state, and what happens in a frame: take results, draw, take commands, act.
+
+use std::path::PathBuf;
+use std::sync::mpsc;
+
+use egui::{CentralPanel, Panel, ScrollArea, Ui};
+use normend_core::Document;
+use normend_render::{DisplayMode, DrawSettings, SplatRenderer};
+
+use crate::command::{Action, Command, take_shortcuts};
+use crate::dialogs::Dialogs;
+use crate::messages::Messages;
+use crate::panels::export::{self, ExportWindow};
+use crate::panels::open_path::{self, OpenPathWindow};
+use crate::panels::{about, empty, menu_bar, messages, progress, shortcuts, side, status_bar, unsaved};
+use crate::scene_sync::Scene;
+use crate::session::Session;
+use crate::settings::SettingsStore;
+use crate::theme;
+use crate::tools::mend::MendTool;
+use crate::tools::{Tool, ToolEvent};
+use crate::viewport::{Pixel, Viewport};
+use crate::work::{ScanOrigin, Work};
+
+/// The windows over the editor; `None` or `false` is closed.
+#[derive(Default)]
+pub(crate) struct Windows {
+    pub(crate) export: Option<ExportWindow>,
+    pub(crate) open_path: Option<OpenPathWindow>,
+    pub(crate) unsaved: Option<Leaving>,
+    pub(crate) shortcuts: bool,
+    pub(crate) log: bool,
+    pub(crate) about: bool,
+}
+
+/// A step that leaves the present document behind.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Leaving {
+    /// Close the editor.
+    Quit,
+    /// Open another scan.
+    Open(ScanOrigin),
+}
+
+/// The editor.
+pub struct App {
+    pub(crate) ctx: egui::Context,
+    pub(crate) settings: SettingsStore,
+    pub(crate) scene: Option<Scene>,
+    pub(crate) adapter: String,
+    pub(crate) session: Option<Session>,
+    pub(crate) viewport: Viewport,
+    pub(crate) tool: Tool,
+    pub(crate) mend: MendTool,
+    pub(crate) mode: DisplayMode,
+    pub(crate) work: Option<Work>,
+    pub(crate) dialogs: Dialogs,
+    pub(crate) windows: Windows,
+    pub(crate) messages: Messages,
+    /// What to do once the running export is written.
+    pub(crate) after_export: Option<Leaving>,
+    /// The user has decided to close the editor.
+    pub(crate) quitting: bool,
+    /// The revision that the last click in the view made; the second click of a double-click takes it back.
+    pub(crate) clicked_revision: Option<u64>,
+    hovered: Option<Pixel>,
+    gpu_errors: mpsc::Receiver<String>,
+    can_drop: bool,
+    title: String,
+    window_size: Option<[f32; 2]>,
+}
+
+impl App {
+    /// The editor with the user's settings; opens `scan` when one is given.
+    pub fn new(cc: &eframe::CreationContext<'_>, scan: Option<PathBuf>) -> Self {
+        let (settings, problem) = SettingsStore::load();
+        Self::with_settings(cc, scan, settings, problem)
+    }
+
+    /// The editor with other settings than the user's. `problem` is said at the start.
+    pub fn with_settings(
+        cc: &eframe::CreationContext<'_>,
+        scan: Option<PathBuf>,
+        settings: SettingsStore,
+        problem: Option<String>,
+    ) -> Self {
+        theme::apply(&cc.egui_ctx);
+        cc.egui_ctx.set_theme(settings.settings.theme.preference());
+        let mut messages = Messages::default();
+        if let Some(problem) = problem {
+            messages.error(problem);
+        }
+        let (sender, gpu_errors) = mpsc::channel();
+        let (scene, adapter) = match &cc.wgpu_render_state {
+            Some(state) => {
+                let ctx = cc.egui_ctx.clone();
+                state.device.on_uncaptured_error(std::sync::Arc::new(move |error| {
+                    // The editor may be gone; then nobody needs the message.
+                    let _ = sender.send(error.to_string());
+                    ctx.request_repaint();
+                }));
+                let info = state.adapter.get_info();
+                let scene = match SplatRenderer::check_adapter(&state.adapter) {
+                    Ok(()) => Some(Scene::new(state.clone())),
+                    Err(error) => {
+                        messages.error(format!("Scans can be opened and exported, but not shown: {error}."));
+                        None
+                    }
+                };
+                (scene, format!("{} ({})", info.name, info.backend))
+            }
+            None => {
+                messages.error("There is no graphics adapter: scans can be opened and exported, but not shown.");
+                (None, "No graphics adapter".to_owned())
+            }
+        };
+        let mut app = Self {
+            ctx: cc.egui_ctx.clone(),
+            settings,
+            scene,
+            adapter,
+            session: None,
+            viewport: Viewport::new(),
+            tool: Tool::default(),
+            mend: MendTool::default(),
+            mode: DisplayMode::default(),
+            work: None,
+            dialogs: Dialogs::new(),
+            windows: Windows::default(),
+            messages,
+            after_export: None,
+            quitting: false,
+            clicked_revision: None,
+            hovered: None,
+            gpu_errors,
+            // winit gives no dropped files on Wayland.
+            can_drop: std::env::var_os("WAYLAND_DISPLAY").is_none_or(|name| name.is_empty()),
+            title: String::new(),
+            window_size: None,
+        };
+        if let Some(path) = scan {
+            app.open(ScanOrigin::File(path));
+        }
+        app
+    }
+
+    /// The document of the open scan.
+    pub fn document(&self) -> Option<&Document> {
+        self.session.as_ref().map(|session| &session.document)
+    }
+
+    /// Whether a job runs.
+    pub fn is_busy(&self) -> bool {
+        self.work.is_some()
+    }
+
+    /// Whether there are mends that no exported file has.
+    pub fn is_unsaved(&self) -> bool {
+        self.session.as_ref().is_some_and(Session::is_unsaved)
+    }
+
+    /// How many points a click at the pointer would turn; `None` when it is not on the scan or not known yet.
+    pub fn n_would_turn(&self) -> Option<u64> {
+        self.mend.n_would_turn()
+    }
+
+    /// The 3D view's place in the window, in points.
+    pub fn view_rect(&self) -> egui::Rect {
+        self.viewport.rect
+    }
+
+    /// Reads the 3D view's picture back: width, height, and RGBA rows from the top. Blocks.
+    pub fn picture(&self) -> Option<([u32; 2], Vec<u8>)> {
+        self.scene.as_ref()?.read_picture()
+    }
+
+    /// All messages of this run, oldest first.
+    pub fn messages(&self) -> &Messages {
+        &self.messages
+    }
+
+    fn draw_settings(&self, dark: bool) -> DrawSettings {
+        DrawSettings {
+            mode: self.mode,
+            palette: theme::palette(self.settings.settings.palette, dark),
+            splat_scale: self.settings.settings.splat_scale,
+            stride: 1,
+        }
+    }
+
+    fn take_gpu_errors(&mut self) {
+        while let Ok(error) = self.gpu_errors.try_recv() {
+            let first_line = error
+                .lines()
+                .find(|line| !line.trim().is_empty())
+                .unwrap_or("no reason given")
+                .trim();
+            tracing::error!("{error}");
+            self.messages
+                .error(format!("The graphics adapter reports an error: {first_line}"));
+        }
+    }
+
+    fn take_drops(&mut self) {
+        let dropped: Vec<PathBuf> = self.ctx.input(|input| {
+            input
+                .raw
+                .dropped_files
+                .iter()
+                .map(|file| file.path().to_path_buf())
+                .collect()
+        });
+        if dropped.len() > 1 {
+            self.messages.info("Only the first of the dropped files is opened.");
+        }
+        if let Some(path) = dropped.into_iter().next() {
+            self.act(Action::OpenScan(path));
+        }
+    }
+
+    fn take_keys(&mut self) {
+        let typing = self.ctx.text_edit_focused();
+        let focused = self.ctx.memory(|memory| memory.focused());
+        let widget_focused = focused.is_some() && focused != self.viewport.id();
+        for command in take_shortcuts(&self.ctx, typing, widget_focused) {
+            // A shortcut that does not apply now says why instead of nothing.
+            match self.availability(command) {
+                Ok(()) => self.act(command.into()),
+                Err(reason) => self.messages.info(format!("{}: {reason}.", command.label())),
+            }
+        }
+    }
+
+    fn bars(&mut self, ui: &mut Ui) -> Option<Action> {
+        let mut action = None;
+        let frame = theme::panel_frame(ui.style());
+        Panel::top("menus").frame(frame).show(ui, |ui| {
+            let availability = |command| self.availability(command);
+            action = menu_bar::menus(ui, &availability, &self.settings.settings.recent);
+        });
+        Panel::top("toolbar").frame(frame).show(ui, |ui| {
+            let mut tool = self.tool;
+            let document = self.document();
+            let undo = document.and_then(Document::next_undo).map(|edit| edit.label());
+            let redo = document.and_then(Document::next_redo).map(|edit| edit.label());
+            let availability = |command| self.availability(command);
+            if let Some(chosen) = menu_bar::toolbar(ui, &availability, undo, redo, &mut tool) {
+                action = Some(chosen);
+            }
+            self.tool = tool;
+        });
+        Panel::bottom("status").frame(frame).show(ui, |ui| {
+            status_bar::ui(ui, self.session.as_ref(), self.mend.n_would_turn(), &self.adapter);
+        });
+        action
+    }
+
+    fn side_panel(&mut self, ui: &mut Ui) -> Option<Action> {
+        let blocked = self.availability(Command::Propagate).err();
+        let propagating = matches!(self.work, Some(Work::Propagate(_)));
+        let session = self.session.as_mut()?;
+        let settings = &mut self.settings.settings;
+        let palette = theme::palette(settings.palette, ui.visuals().dark_mode);
+        let mode = &mut self.mode;
+        let frame = egui::Frame::new()
+            .fill(ui.visuals().panel_fill)
+            .inner_margin(egui::Margin::symmetric(theme::SPACE_M as i8, theme::SPACE_M as i8));
+        Panel::right("side")
+            .frame(frame)
+            .resizable(false)
+            .exact_size(theme::SIDE_PANEL_WIDTH)
+            .show(ui, |ui| {
+                ScrollArea::vertical()
+                    .auto_shrink([false, false])
+                    .show(ui, |ui| {
+                        side::ui(ui, session, settings, mode, &palette, propagating, blocked)
+                    })
+                    .inner
+            })
+            .inner
+    }
+
+    fn central(&mut self, ui: &mut Ui) -> Option<Action> {
+        let dark = ui.visuals().dark_mode;
+        let mut draw_settings = self.draw_settings(dark);
+        let frame = egui::Frame::new().fill(ui.visuals().panel_fill);
+        CentralPanel::no_frame()
+            .frame(frame)
+            .show(ui, |ui| {
+                let area = ui.available_rect_before_wrap();
+                let mut action = None;
+                if self.session.is_some() {
+                    self.view(ui, &mut draw_settings);
+                } else if self.work.is_none() {
+                    action = empty::ui(ui, &self.settings.settings.recent, self.can_drop);
+                }
+                self.overlays(ui, area);
+                action
+            })
+            .inner
+    }
+
+    fn view(&mut self, ui: &mut Ui, draw_settings: &mut DrawSettings) {
+        let Some(scene) = &mut self.scene else {
+            ui.centered_and_justified(|ui| ui.label("There is no graphics adapter to show the scan."));
+            return;
+        };
+        let under_pointer = self.mend.target().map(|target| target.position());
+        let pointer = self.viewport.ui(ui, scene, draw_settings, under_pointer);
+        self.settings.settings.splat_scale = draw_settings.splat_scale.clamp(
+            *crate::settings::SPLAT_SCALES.start(),
+            *crate::settings::SPLAT_SCALES.end(),
+        );
+        let asked = match (pointer.clicked, pointer.pivot) {
+            (_, Some(pixel)) => self.mend.pivot(scene, pixel),
+            (Some((pixel, shift)), None) => self.mend.click(scene, pixel, shift),
+            (None, None) => None,
+        };
+        if pointer.by_double_click {
+            self.take_back_click();
+        }
+        self.handle(asked);
+        let (Some(scene), Some(session)) = (&mut self.scene, &self.session) else {
+            return;
+        };
+        let answered = self.mend.update(scene, session, &pointer);
+        self.handle(answered);
+        self.hovered = pointer.hovered;
+        if self.mend.is_picking() {
+            ui.request_repaint();
+        }
+        if let (Some(position), Some(n_points)) = (pointer.position, self.mend.n_would_turn()) {
+            let text = format!("Turns {}", theme::counted(n_points, "point", "points"));
+            self.viewport.badge(ui, position, &text);
+        }
+    }
+
+    /// The first click of a double-click mended something; the user meant the pivot.
+    fn take_back_click(&mut self) {
+        let revision = self.document().map(Document::revision);
+        if self
+            .clicked_revision
+            .take()
+            .is_some_and(|clicked| Some(clicked) == revision)
+        {
+            self.act(Command::Undo.into());
+        }
+    }
+
+    pub(crate) fn handle(&mut self, event: Option<ToolEvent>) {
+        match event {
+            None => {}
+            Some(ToolEvent::Mend(point)) => {
+                self.apply_edit(normend_core::Edit::Mend(point));
+                self.clicked_revision = self.document().map(Document::revision);
+            }
+            Some(ToolEvent::SelectSource { point, extend }) => self.act(Action::SelectSource { point, extend }),
+            Some(ToolEvent::Deselect) => self.deselect(),
+            Some(ToolEvent::Pivot(point)) => self.viewport.camera.set_pivot(point),
+        }
+    }
+
+    /// The pixel that keyboard commands mean: under the pointer, else the middle of the view.
+    pub(crate) fn meant_pixel(&self) -> Pixel {
+        self.hovered.unwrap_or_else(|| self.viewport.center())
+    }
+
+    fn overlays(&mut self, ui: &Ui, area: egui::Rect) {
+        if let Some(work) = &self.work
+            && progress::ui(ui, area, &work.title(), &work.status())
+        {
+            work.cancel();
+        }
+        messages::toasts(ui, area, &mut self.messages);
+        if ui.input(|input| !input.raw.hovered_files.is_empty()) {
+            let painter = ui
+                .ctx()
+                .layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop")));
+            let color = theme::accent(ui);
+            painter.rect_filled(area, 0.0, ui.visuals().panel_fill.gamma_multiply(0.85));
+            let frame = area.shrink(theme::SPACE_L);
+            painter.rect_stroke(frame, 8.0, egui::Stroke::new(2.0, color), egui::StrokeKind::Inside);
+            let font = egui::FontId::proportional(20.0);
+            painter.text(area.center(), egui::Align2::CENTER_CENTER, "Drop to open", font, color);
+        }
+    }
+
+    fn show_windows(&mut self, ui: &Ui) {
+        if let Some(mut window) = self.windows.open_path.take() {
+            match window.ui(ui) {
+                open_path::Decision::Wait => self.windows.open_path = Some(window),
+                open_path::Decision::Close => {}
+                open_path::Decision::Open(path) => self.act(Action::OpenScan(path)),
+            }
+        }
+        if let Some(mut window) = self.windows.export.take() {
+            match window.ui(ui) {
+                export::Decision::Wait => self.windows.export = Some(window),
+                export::Decision::Close => self.after_export = None,
+                export::Decision::Browse => {
+                    self.windows.export = Some(window);
+                    self.act(Action::BrowseExport);
+                }
+                export::Decision::Export { path, overwrite_input } => {
+                    self.act(Action::ExportTo { path, overwrite_input });
+                }
+            }
+        }
+        if let Some(leaving) = self.windows.unsaved.clone() {
+            let name = self.session.as_ref().map_or("this scan", |session| &session.name);
+            match unsaved::ui(ui, name) {
+                unsaved::Decision::Wait => {}
+                unsaved::Decision::Export => {
+                    self.windows.unsaved = None;
+                    self.act(Command::Export.into());
+                    self.after_export = Some(leaving);
+                }
+                unsaved::Decision::Discard => {
+                    self.windows.unsaved = None;
+                    self.leave_now(leaving);
+                }
+                unsaved::Decision::Cancel => self.windows.unsaved = None,
+            }
+        }
+        if self.windows.shortcuts {
+            shortcuts::ui(ui, &mut self.windows.shortcuts);
+        }
+        if self.windows.log {
+            messages::log(ui, &mut self.windows.log, &self.messages);
+        }
+        if self.windows.about {
+            about::ui(ui, &mut self.windows.about, &self.adapter);
+        }
+    }
+
+    fn answer_close_request(&mut self) {
+        if self.quitting || !self.ctx.input(|input| input.viewport().close_requested()) {
+            return;
+        }
+        if matches!(self.work, Some(Work::Export { .. })) {
+            self.ctx.send_viewport_cmd(egui::ViewportCommand::CancelClose);
+            self.after_export = Some(Leaving::Quit);
+            self.messages.info("The editor closes when the export is written.");
+        } else if self.is_unsaved() {
+            self.ctx.send_viewport_cmd(egui::ViewportCommand::CancelClose);
+            self.windows.unsaved = Some(Leaving::Quit);
+        }
+    }
+
+    fn keep_title(&mut self) {
+        let title = match &self.session {
+            Some(session) if session.is_unsaved() => format!("{}* – Normend", session.name),
+            Some(session) => format!("{} – Normend", session.name),
+            None => "Normend".to_owned(),
+        };
+        if title != self.title {
+            self.ctx.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
+            self.title = title;
+        }
+    }
+
+    fn keep_settings(&mut self) {
+        self.ctx.set_theme(self.settings.settings.theme.preference());
+        let (pressed, rect) = self
+            .ctx
+            .input(|input| (input.pointer.any_down(), input.viewport().inner_rect));
+        self.window_size = rect.map(|rect| [rect.width(), rect.height()]);
+        // Not in the middle of a drag: a slider would write the file with every step.
+        if !pressed && let Err(problem) = self.settings.save_if_changed() {
+            self.messages.error(problem);
+        }
+    }
+}
+
+impl eframe::App for App {
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        self.take_gpu_errors();
+        self.take_dialogs();
+        self.take_work();
+        self.take_drops();
+        self.take_keys();
+        self.answer_close_request();
+        let now = ui.input(|input| input.time);
+        if let Some(secs) = self.messages.tick(now) {
+            ui.request_repaint_after(std::time::Duration::from_secs_f64(secs.max(0.0)));
+        }
+
+        let mut actions = Vec::new();
+        actions.extend(self.bars(ui));
+        actions.extend(self.side_panel(ui));
+        actions.extend(self.central(ui));
+        self.show_windows(ui);
+        for action in actions {
+            self.act(action);
+        }
+        self.keep_title();
+        self.keep_settings();
+    }
+
+    fn on_exit(&mut self) {
+        if let Some(size) = self.window_size {
+            self.settings.settings.window_size = size;
+        }
+        if let Err(problem) = self.settings.save_if_changed() {
+            tracing::warn!("{problem}");
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! What the editor has to say: shown for a while over the view, kept in the log.
+
+/// How important a message is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// Something was done. Goes away by itself.
+    Info,
+    /// Something failed. Stays until it is closed.
+    Error,
+}
+
+/// One message.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Message {
+    /// How important.
+    pub level: Level,
+    /// One or two sentences.
+    pub text: String,
+    /// How often it was said in a row.
+    pub n_times: u32,
+    /// Seconds since the editor started at which it leaves the view; `None` once it has left.
+    pub(crate) shown_until: Option<f64>,
+}
+
+/// All messages of this run, oldest first, the last few hundred.
+#[derive(Debug, Default)]
+pub struct Messages {
+    entries: Vec<Message>,
+    now: f64,
+}
+
+const MAX_ENTRIES: usize = 300;
+const SHOWN_SECS: f64 = 7.0;
+
+impl Messages {
+    /// Says that something was done.
+    pub fn info(&mut self, text: impl Into<String>) {
+        let text = text.into();
+        tracing::info!("{text}");
+        self.push(Level::Info, text, self.now + SHOWN_SECS);
+    }
+
+    /// Says what failed and what to do.
+    pub fn error(&mut self, text: impl Into<String>) {
+        let text = text.into();
+        tracing::error!("{text}");
+        self.push(Level::Error, text, f64::INFINITY);
+    }
+
+    fn push(&mut self, level: Level, text: String, shown_until: f64) {
+        if let Some(last) = self.entries.last_mut()
+            && last.level == level
+            && last.text == text
+        {
+            last.n_times += 1;
+            last.shown_until = Some(shown_until);
+            return;
+        }
+        if self.entries.len() == MAX_ENTRIES {
+            self.entries.remove(0);
+        }
+        self.entries.push(Message {
+            level,
+            text,
+            n_times: 1,
+            shown_until: Some(shown_until),
+        });
+    }
+
+    /// Lets messages leave the view whose time is over at `now` (seconds since the editor started).
+    /// Returns the seconds until the next one leaves.
+    pub(crate) fn tick(&mut self, now: f64) -> Option<f64> {
+        self.now = now;
+        for entry in &mut self.entries {
+            if entry.shown_until.is_some_and(|until| until <= now) {
+                entry.shown_until = None;
+            }
+        }
+        self.entries
+            .iter()
+            .filter_map(|entry| entry.shown_until)
+            .filter(|until| until.is_finite())
+            .map(|until| until - now)
+            .reduce(f64::min)
+    }
+
+    /// All that are kept, oldest first.
+    pub fn entries(&self) -> &[Message] {
+        &self.entries
+    }
+
+    pub(crate) fn entries_mut(&mut self) -> &mut [Message] {
+        &mut self.entries
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn information_leaves_and_errors_stay() {
+        let mut messages = Messages::default();
+        messages.info("Opened.");
+        messages.error("Failed.");
+        assert_eq!(messages.tick(1.0), Some(SHOWN_SECS - 1.0));
+        assert_eq!(messages.tick(SHOWN_SECS), None);
+        let shown: Vec<_> = messages
+            .entries()
+            .iter()
+            .map(|entry| entry.shown_until.is_some())
+            .collect();
+        assert_eq!(shown, [false, true]);
+    }
+
+    #[test]
+    fn repeated_messages_are_one_entry_and_the_log_is_bounded() {
+        let mut messages = Messages::default();
+        messages.error("Failed.");
+        messages.error("Failed.");
+        assert_eq!(messages.entries().len(), 1);
+        assert_eq!(messages.entries()[0].n_times, 2);
+        for index in 0..MAX_ENTRIES + 5 {
+            messages.info(format!("{index}"));
+        }
+        assert_eq!(messages.entries().len(), MAX_ENTRIES);
+    }
+}

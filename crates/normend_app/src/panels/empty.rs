@@ -1,0 +1,90 @@
+//! What is shown while no scan is open: what Normend does, and the ways to begin.
+
+use std::path::PathBuf;
+
+use egui::{Align, Button, Layout, RichText, Ui, Vec2};
+
+use crate::command::{Action, Command};
+use crate::theme::{self, SPACE_L, SPACE_M, SPACE_S, SPACE_XS};
+
+const WIDTH: f32 = 460.0;
+const RECENT_SHOWN: usize = 5;
+
+/// The empty state. `can_drop` says whether the system delivers dropped files.
+pub fn ui(ui: &mut Ui, recent: &[PathBuf], can_drop: bool) -> Option<Action> {
+    let mut action = None;
+    let height = 236.0
+        + if recent.is_empty() {
+            0.0
+        } else {
+            40.0 + 34.0 * recent.len().min(RECENT_SHOWN) as f32
+        };
+    let space = ((ui.available_height() - height) * 0.42).max(SPACE_L);
+    ui.add_space(space);
+    let margin = ((ui.available_width() - WIDTH) * 0.5).max(SPACE_L);
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 0.0;
+        ui.add_space(margin);
+        ui.allocate_ui_with_layout(Vec2::new(WIDTH, height), Layout::top_down(Align::Min), |ui| {
+            ui.spacing_mut().item_spacing = Vec2::new(SPACE_S, SPACE_S);
+            ui.label(RichText::new("Normend").size(32.0).strong());
+            ui.add_space(SPACE_XS);
+            let claim = "Make every normal of a point cloud point to the right side: open a scan, click what is wrong, export it.";
+            ui.add(egui::Label::new(RichText::new(claim).size(15.0)).wrap());
+            ui.add_space(SPACE_L);
+            ui.horizontal(|ui| {
+                let size = Vec2::new(0.0, 36.0);
+                let open = theme::primary_button(ui, "Open a scan…").min_size(size);
+                let keys = Command::Open.keys_text(ui.ctx());
+                if ui.add(open).on_hover_text(format!("{} ({keys})", Command::Open.tooltip())).clicked() {
+                    action = Some(Command::Open.into());
+                }
+                let sample = Button::new("Try the sample").min_size(size);
+                if ui.add(sample).on_hover_text(Command::OpenSample.tooltip()).clicked() {
+                    action = Some(Command::OpenSample.into());
+                }
+                let path = Button::new("Type a path…").min_size(size);
+                if ui.add(path).on_hover_text(Command::OpenPath.tooltip()).clicked() {
+                    action = Some(Command::OpenPath.into());
+                }
+            });
+            ui.add_space(SPACE_XS);
+            let formats = if can_drop {
+                "PLY and XYZ text. You can also drop a file on this window."
+            } else {
+                "PLY and XYZ text."
+            };
+            ui.label(RichText::new(formats).weak());
+            if recent.is_empty() {
+                return;
+            }
+            ui.add_space(SPACE_L);
+            ui.label(RichText::new("Recent scans").strong());
+            for path in recent.iter().take(RECENT_SHOWN) {
+                if recent_row(ui, path).clicked() {
+                    action = Some(Action::OpenScan(path.clone()));
+                }
+            }
+        });
+    });
+    action
+}
+
+fn recent_row(ui: &mut Ui, path: &std::path::Path) -> egui::Response {
+    let name = path
+        .file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
+        .into_owned();
+    let folder = path
+        .parent()
+        .map(|folder| folder.display().to_string())
+        .unwrap_or_default();
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = SPACE_M;
+        let response = ui.link(name).on_hover_text(path.display().to_string());
+        ui.add(egui::Label::new(RichText::new(folder).weak()).truncate());
+        response
+    })
+    .inner
+}

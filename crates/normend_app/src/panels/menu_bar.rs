@@ -1,0 +1,134 @@
+//! The menus and the toolbar, both built from the table of commands.
+
+use std::path::PathBuf;
+
+use egui::{Button, RichText, Ui};
+
+use super::Availability;
+use crate::command::{Action, Command, Menu};
+use crate::theme::{SPACE_S, SPACE_XS};
+use crate::tools::Tool;
+
+/// The menu bar. `recent` are the scans opened last.
+pub fn menus(ui: &mut Ui, availability: &Availability<'_>, recent: &[PathBuf]) -> Option<Action> {
+    let mut action = None;
+    egui::MenuBar::new().ui(ui, |ui| {
+        for menu in Menu::ALL {
+            ui.menu_button(menu.label(), |ui| {
+                ui.set_min_width(232.0);
+                let mut group = None;
+                for command in Command::ALL.into_iter().filter(|command| command.menu() == menu) {
+                    if group.is_some_and(|group| group != command.group()) {
+                        ui.separator();
+                    }
+                    group = Some(command.group());
+                    if item(ui, command, availability) {
+                        action = Some(command.into());
+                    }
+                    if command == Command::OpenSample
+                        && let Some(chosen) = recent_menu(ui, recent)
+                    {
+                        action = Some(chosen);
+                    }
+                }
+            });
+        }
+    });
+    action
+}
+
+fn item(ui: &mut Ui, command: Command, availability: &Availability<'_>) -> bool {
+    let available = availability(command);
+    let mut button = Button::new(command.label());
+    if let Some(shortcut) = command.keys().first() {
+        button = button.shortcut_text(ui.ctx().format_shortcut(shortcut));
+    }
+    let response = ui.add_enabled(available.is_ok(), button);
+    match available {
+        Ok(()) => response.on_hover_text(command.tooltip()).clicked(),
+        Err(reason) => response.on_disabled_hover_text(reason).clicked(),
+    }
+}
+
+fn recent_menu(ui: &mut Ui, recent: &[PathBuf]) -> Option<Action> {
+    let mut action = None;
+    ui.add_enabled_ui(!recent.is_empty(), |ui| {
+        ui.menu_button("Open recent", |ui| {
+            for path in recent {
+                let name = path
+                    .file_name()
+                    .unwrap_or(path.as_os_str())
+                    .to_string_lossy()
+                    .into_owned();
+                if ui.button(name).on_hover_text(path.display().to_string()).clicked() {
+                    action = Some(Action::OpenScan(path.clone()));
+                }
+            }
+            ui.separator();
+            if ui.button("Clear this list").clicked() {
+                action = Some(Action::ClearRecent);
+            }
+        });
+    });
+    action
+}
+
+/// The toolbar: the commands used most, and the tools. `undo` and `redo` name the edits that would be undone and redone.
+pub fn toolbar(
+    ui: &mut Ui,
+    availability: &Availability<'_>,
+    undo: Option<&str>,
+    redo: Option<&str>,
+    tool: &mut Tool,
+) -> Option<Action> {
+    let mut action = None;
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = SPACE_XS;
+        for (index, (command, of)) in [
+            (Command::Open, None),
+            (Command::Export, None),
+            (Command::Undo, undo),
+            (Command::Redo, redo),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            if index == 2 {
+                divider(ui);
+            }
+            let available = availability(command);
+            let response = ui.add_enabled(available.is_ok(), Button::new(command.label()));
+            let keys = command.keys_text(ui.ctx());
+            let tooltip = match of {
+                Some(edit) => format!("{}: {edit} ({keys})", command.tooltip()),
+                None => format!("{} ({keys})", command.tooltip()),
+            };
+            let clicked = match available {
+                Ok(()) => response.on_hover_text(tooltip).clicked(),
+                Err(reason) => response.on_disabled_hover_text(reason).clicked(),
+            };
+            if clicked {
+                action = Some(command.into());
+            }
+        }
+        divider(ui);
+        ui.label(RichText::new("Tool").weak());
+        for each in Tool::ALL {
+            let selected = *tool == each;
+            if ui
+                .add(Button::selectable(selected, each.label()))
+                .on_hover_text(each.tooltip())
+                .clicked()
+            {
+                *tool = each;
+            }
+        }
+    });
+    action
+}
+
+fn divider(ui: &mut Ui) {
+    ui.add_space(SPACE_S);
+    ui.separator();
+    ui.add_space(SPACE_S);
+}

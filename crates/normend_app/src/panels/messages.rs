@@ -1,0 +1,97 @@
+//! Messages over the view, and the log of all of them.
+
+use egui::{Align2, Area, Button, Id, Label, Order, Rect, RichText, ScrollArea, Ui, Vec2};
+
+use crate::messages::{Level, Messages};
+use crate::theme::{self, SPACE_M, SPACE_S};
+
+const WIDTH: f32 = 380.0;
+const MAX_SHOWN: usize = 4;
+
+/// The newest messages in the upper right corner of `view`.
+pub fn toasts(ui: &Ui, view: Rect, messages: &mut Messages) {
+    let shown: Vec<usize> = messages
+        .entries()
+        .iter()
+        .enumerate()
+        .rev()
+        .filter(|(_, entry)| entry.shown_until.is_some())
+        .map(|(index, _)| index)
+        .take(MAX_SHOWN)
+        .collect();
+    if shown.is_empty() {
+        return;
+    }
+    Area::new(Id::unique("messages"))
+        .order(Order::Foreground)
+        .pivot(Align2::RIGHT_TOP)
+        .fixed_pos(view.right_top() + Vec2::new(-SPACE_M, SPACE_M))
+        .show(ui.ctx(), |ui| {
+            for index in shown {
+                let Some(entry) = messages.entries_mut().get_mut(index) else {
+                    continue;
+                };
+                theme::card(ui).show(ui, |ui| {
+                    ui.set_width(WIDTH);
+                    ui.horizontal_top(|ui| {
+                        let width = WIDTH - 76.0;
+                        ui.allocate_ui(Vec2::new(width, 0.0), |ui| {
+                            ui.set_width(width);
+                            let color = match entry.level {
+                                Level::Info => ui.visuals().text_color(),
+                                Level::Error => ui.visuals().error_fg_color,
+                            };
+                            let times = if entry.n_times > 1 {
+                                format!(" (×{})", entry.n_times)
+                            } else {
+                                String::new()
+                            };
+                            ui.add(Label::new(RichText::new(format!("{}{times}", entry.text)).color(color)).wrap());
+                        });
+                        let close = ui.add(Button::new("Close").frame(false));
+                        if close.on_hover_text("Hide this message; the log keeps it").clicked() {
+                            entry.shown_until = None;
+                        }
+                    });
+                });
+            }
+        });
+}
+
+/// The window with all messages of this run.
+pub fn log(ui: &Ui, open: &mut bool, messages: &Messages) {
+    egui::Window::new("Messages")
+        .open(open)
+        .default_size([520.0, 280.0])
+        .collapsible(false)
+        .show(ui.ctx(), |ui| {
+            if messages.entries().is_empty() {
+                ui.label(RichText::new("Nothing was said yet.").weak());
+                return;
+            }
+            ScrollArea::vertical()
+                .auto_shrink([false, false])
+                .stick_to_bottom(true)
+                .show(ui, |ui| {
+                    egui::Grid::new("log")
+                        .num_columns(2)
+                        .spacing([SPACE_M, SPACE_S])
+                        .show(ui, |ui| {
+                            for entry in messages.entries() {
+                                let (name, color) = match entry.level {
+                                    Level::Info => ("Done", ui.visuals().weak_text_color()),
+                                    Level::Error => ("Error", ui.visuals().error_fg_color),
+                                };
+                                ui.label(RichText::new(name).color(color));
+                                let times = if entry.n_times > 1 {
+                                    format!(" (×{})", entry.n_times)
+                                } else {
+                                    String::new()
+                                };
+                                ui.add(Label::new(format!("{}{times}", entry.text)).wrap().selectable(true));
+                                ui.end_row();
+                            }
+                        });
+                });
+        });
+}

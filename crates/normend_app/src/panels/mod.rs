@@ -1,0 +1,19 @@
+//! The parts of the window, one file each. They show state and return what the user asks for.
+
+use crate::command::Command;
+
+pub mod about;
+pub mod empty;
+pub mod export;
+pub mod menu_bar;
+pub mod messages;
+pub mod open_path;
+pub mod progress;
+pub mod shortcuts;
+pub mod side;
+pub mod sources;
+pub mod status_bar;
+pub mod unsaved;
+
+/// Says whether a command can be run now, and if not, why.
+pub type Availability<'a> = dyn Fn(Command) -> Result<(), &'static str> + 'a;

@@ -1,0 +1,108 @@
+//! Opening a scan by typing its path: works where no file dialog does.
+
+use std::path::PathBuf;
+
+use egui::{Align2, Key, RichText, TextEdit, Ui, Vec2};
+
+use crate::theme::{self, SPACE_S};
+
+/// The window with the path field.
+#[derive(Clone, Debug, Default)]
+pub struct OpenPathWindow {
+    path: String,
+    note: Option<String>,
+    focused_once: bool,
+}
+
+/// What the user decided.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Decision {
+    /// Not yet.
+    Wait,
+    /// Nothing is opened.
+    Close,
+    /// Open this file.
+    Open(PathBuf),
+}
+
+impl OpenPathWindow {
+    /// An empty field; `note` says why it is shown when the user did not ask for it.
+    pub fn new(note: Option<String>) -> Self {
+        Self {
+            note,
+            ..Self::default()
+        }
+    }
+
+    /// Shows the window.
+    pub fn ui(&mut self, ui: &Ui) -> Decision {
+        let mut decision = Decision::Wait;
+        egui::Window::new("Open a scan")
+            .collapsible(false)
+            .resizable(false)
+            .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
+            .show(ui.ctx(), |ui| {
+                ui.set_width(460.0);
+                if let Some(note) = &self.note {
+                    ui.add(egui::Label::new(RichText::new(note).weak()).wrap());
+                }
+                let label = ui.label("Path of the scan");
+                let field = ui.add(TextEdit::singleline(&mut self.path).desired_width(f32::INFINITY));
+                let field = field.labelled_by(label.id);
+                if !self.focused_once {
+                    field.request_focus();
+                    self.focused_once = true;
+                }
+                let path = typed_path(&self.path);
+                let enter = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+                ui.add_space(SPACE_S);
+                ui.horizontal(|ui| {
+                    let open = ui.add_enabled(path.is_some(), theme::primary_button(ui, "Open"));
+                    if (open.clicked() || enter)
+                        && let Some(path) = path
+                    {
+                        decision = Decision::Open(path);
+                    }
+                    if ui.button("Cancel").clicked() {
+                        decision = Decision::Close;
+                    }
+                });
+            });
+        decision
+    }
+}
+
+/// The path that the user means: without spaces or quotes around it, and with `~/` as the home folder.
+pub fn typed_path(text: &str) -> Option<PathBuf> {
+    let text = text.trim();
+    let text = ['"', '\'']
+        .iter()
+        .find_map(|&quote| text.strip_prefix(quote)?.strip_suffix(quote))
+        .unwrap_or(text);
+    if text.is_empty() {
+        return None;
+    }
+    if let Some(rest) = text.strip_prefix("~/")
+        && let Some(folders) = directories::BaseDirs::new()
+    {
+        return Some(folders.home_dir().join(rest));
+    }
+    Some(PathBuf::from(text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn typed_paths_are_what_the_user_means() {
+        let check = |text, expect: Option<&str>| assert_eq!(typed_path(text), expect.map(PathBuf::from));
+        check("", None);
+        check("  ", None);
+        check("\"\"", None);
+        check(" /scans/a b.ply ", Some("/scans/a b.ply"));
+        check("'/scans/a b.ply'", Some("/scans/a b.ply"));
+        let home = directories::BaseDirs::new().unwrap().home_dir().join("a.ply");
+        assert_eq!(typed_path("~/a.ply"), Some(home));
+    }
+}

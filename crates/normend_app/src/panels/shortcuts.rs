@@ -1,0 +1,73 @@
+//! The sheet of shortcuts, from the table of commands.
+
+use egui::{Align2, RichText, ScrollArea, Ui, Vec2};
+
+use crate::command::{Command, MOUSE, Menu};
+use crate::theme::{self, SPACE_L, SPACE_XS};
+
+/// The window with every key and what the mouse does.
+pub fn ui(ui: &Ui, open: &mut bool) {
+    egui::Window::new("Keys and mouse")
+        .open(open)
+        .collapsible(false)
+        .resizable(false)
+        .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
+        .show(ui.ctx(), |ui| {
+            let height = (ui.ctx().content_rect().height() - 140.0).max(200.0);
+            ScrollArea::vertical().max_height(height).show(ui, |ui| {
+                ui.horizontal_top(|ui| {
+                    ui.spacing_mut().item_spacing.x = 2.0 * SPACE_L;
+                    ui.vertical(|ui| {
+                        mouse(ui);
+                        for menu in [Menu::File, Menu::Edit, Menu::Help] {
+                            keys(ui, menu);
+                        }
+                    });
+                    ui.vertical(|ui| keys(ui, Menu::View));
+                });
+            });
+        });
+}
+
+fn mouse(ui: &mut Ui) {
+    theme::section(ui, "Mouse", |ui| {
+        sheet(
+            ui,
+            "mouse",
+            MOUSE.into_iter().map(|(does, what)| (what, does.to_owned())),
+        );
+    });
+}
+
+fn keys(ui: &mut Ui, menu: Menu) {
+    let ctx = ui.ctx().clone();
+    theme::section(ui, menu.label(), |ui| {
+        let commands = Command::ALL.into_iter().filter(|command| command.menu() == menu);
+        sheet(
+            ui,
+            menu.label(),
+            commands.map(|command| (command.label(), command.keys_text(&ctx))),
+        );
+    });
+}
+
+fn sheet(ui: &mut Ui, id: &str, rows: impl Iterator<Item = (&'static str, String)>) {
+    egui::Grid::new(id)
+        .num_columns(2)
+        .min_col_width(208.0)
+        .spacing([SPACE_L, SPACE_XS])
+        .show(ui, |ui| {
+            for (what, keys) in rows {
+                ui.label(what);
+                ui.label(
+                    RichText::new(if keys.is_empty() {
+                        "in the menu".to_owned()
+                    } else {
+                        keys
+                    })
+                    .weak(),
+                );
+                ui.end_row();
+            }
+        });
+}

@@ -1,0 +1,249 @@
+//! The side panel: the scan, the propagation's parameters, the view, the sources.
+
+use egui::{Button, Color32, ComboBox, DragValue, RichText, Slider, Ui, Vec2};
+use normend_core::{EdgeRule, Estimator, Parameters, Start};
+use normend_render::{DisplayMode, Palette};
+
+use super::sources;
+use crate::command::{Action, Command};
+use crate::session::Session;
+use crate::settings::{PaletteChoice, SPLAT_SCALES, Settings, ThemeChoice};
+use crate::theme::{self, SPACE_S, SPACE_XS};
+
+const K_NORMALS: std::ops::RangeInclusive<usize> = 3..=64;
+const K_GRAPH: std::ops::RangeInclusive<usize> = 1..=32;
+
+/// The side panel. `propagating` says that a propagation runs, `blocked` why none can be started.
+pub fn ui(
+    ui: &mut Ui,
+    session: &mut Session,
+    settings: &mut Settings,
+    mode: &mut DisplayMode,
+    palette: &Palette,
+    propagating: bool,
+    blocked: Option<&str>,
+) -> Option<Action> {
+    let mut action = None;
+    theme::section(ui, "Scan", |ui| scan(ui, session));
+    if let Some(chosen) = theme::section(ui, "Propagation", |ui| propagation(ui, session, propagating, blocked)) {
+        action = Some(chosen);
+    }
+    theme::section(ui, "View", |ui| view(ui, settings, mode, palette));
+    if let Some(chosen) = theme::section(ui, "Sources", |ui| sources::ui(ui, session)) {
+        action = Some(chosen);
+    }
+    action
+}
+
+fn scan(ui: &mut Ui, session: &Session) {
+    theme::rows(ui, "scan", |ui| {
+        theme::row(ui, "Name", &session.name);
+        theme::row(ui, "Format", session.scan.format.label());
+        theme::row(ui, "Points", theme::thousands(session.scan.cloud.n_points() as u64));
+        if session.scan.n_left_out > 0 {
+            ui.label(RichText::new("Left out").weak());
+            ui.label(theme::counted(session.scan.n_left_out as u64, "row", "rows"))
+                .on_hover_text("Rows with a coordinate that is not finite. They stay in the file.");
+            ui.end_row();
+        }
+        let (min, max) = session.scan.cloud.bounding_box();
+        let size = max - min;
+        theme::row(
+            ui,
+            "Size",
+            format!("{:.4} × {:.4} × {:.4}", Short(size.x), Short(size.y), Short(size.z)),
+        );
+        theme::row(
+            ui,
+            "Normals",
+            if session.scan.given_normals.is_some() {
+                "In the file"
+            } else {
+                "None in the file"
+            },
+        );
+    });
+}
+
+/// A length with about four significant digits.
+struct Short(f32);
+
+impl std::fmt::Display for Short {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let value = self.0;
+        if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
+            return write!(f, "{value:.2e}");
+        }
+        let digits = (3 - value.abs().max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
+        write!(f, "{value:.digits$}")
+    }
+}
+
+fn propagation(ui: &mut Ui, session: &mut Session, propagating: bool, blocked: Option<&str>) -> Option<Action> {
+    let has_normals = session.scan.given_normals.is_some();
+    let draft = &mut session.draft;
+    theme::rows(ui, "propagation", |ui| {
+        start_row(ui, draft, has_normals);
+        theme::input_row(ui, "Estimator", "How a normal is fitted to its neighbors", |ui| {
+            ComboBox::from_id_salt("estimator")
+                .selected_text(draft.estimator.label())
+                .show_ui(ui, |ui| {
+                    for each in Estimator::ALL {
+                        ui.selectable_value(&mut draft.estimator, each, each.label());
+                    }
+                })
+                .response
+        });
+        theme::input_row(ui, "k for normals", "Neighbors that a normal is fitted to", |ui| {
+            ui.add(DragValue::new(&mut draft.k_normals).range(K_NORMALS).speed(0.1))
+        });
+        theme::input_row(
+            ui,
+            "k for the graph",
+            "Neighbors of each point in the Riemannian graph",
+            |ui| ui.add(DragValue::new(&mut draft.k_graph).range(K_GRAPH).speed(0.1)),
+        );
+        theme::input_row(ui, "Edge rule", "How the normals of neighbors are compared", |ui| {
+            ComboBox::from_id_salt("edge rule")
+                .selected_text(draft.edge_rule.label())
+                .show_ui(ui, |ui| {
+                    for each in EdgeRule::ALL {
+                        ui.selectable_value(&mut draft.edge_rule, each, each.label());
+                    }
+                })
+                .response
+        });
+    });
+    let never_ran = session.document.propagation().is_none() && !propagating;
+    let changed = *draft != session.requested;
+    let mut action = None;
+    ui.add_space(SPACE_XS);
+    ui.horizontal(|ui| {
+        let button = if changed || never_ran {
+            theme::primary_button(ui, "Propagate")
+        } else {
+            Button::new("Propagate")
+        };
+        let response = ui.add_enabled(blocked.is_none(), button);
+        let tooltip = format!(
+            "{} ({})",
+            Command::Propagate.tooltip(),
+            Command::Propagate.keys_text(ui.ctx())
+        );
+        if response
+            .on_hover_text(tooltip)
+            .on_disabled_hover_text(blocked.unwrap_or_default())
+            .clicked()
+        {
+            action = Some(Action::Propagate(*draft));
+        }
+        let revert = ui.add_enabled(changed, Button::new("Revert"));
+        if revert.on_hover_text("Back to the parameters in force").clicked() {
+            *draft = session.requested;
+        }
+    });
+    if changed {
+        ui.label(RichText::new("Changed, not applied yet").color(ui.visuals().warn_fg_color));
+    }
+    action
+}
+
+fn start_row(ui: &mut Ui, draft: &mut Parameters, has_normals: bool) {
+    ui.label(RichText::new("Start").weak())
+        .on_hover_text("Where the first normals come from");
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = SPACE_XS;
+        for each in Start::ALL {
+            let possible = each != Start::Keep || has_normals;
+            let button = Button::selectable(draft.start == each, each.label());
+            let response = ui.add_enabled(possible, button);
+            let tooltip = match each {
+                Start::Estimate => "Fit normals to the points and orient them",
+                Start::Keep => "Take the file's normals and their sides as they are, to mend them",
+            };
+            let response = response
+                .on_hover_text(tooltip)
+                .on_disabled_hover_text("This file has no normals to keep");
+            if response.clicked() {
+                draft.start = each;
+            }
+        }
+    });
+    ui.end_row();
+}
+
+fn view(ui: &mut Ui, settings: &mut Settings, mode: &mut DisplayMode, palette: &Palette) {
+    theme::rows(ui, "view", |ui| {
+        theme::input_row(ui, "Display", "How splats are colored", |ui| {
+            ComboBox::from_id_salt("display mode")
+                .selected_text(mode.label())
+                .show_ui(ui, |ui| {
+                    for each in DisplayMode::ALL {
+                        ui.selectable_value(mode, each, each.label());
+                    }
+                })
+                .response
+        });
+        if *mode == DisplayMode::Facing {
+            theme::input_row(ui, "Colors", "The colors of front and back", |ui| {
+                ComboBox::from_id_salt("palette")
+                    .selected_text(settings.palette.label())
+                    .show_ui(ui, |ui| {
+                        for each in PaletteChoice::ALL {
+                            ui.selectable_value(&mut settings.palette, each, each.label());
+                        }
+                    })
+                    .response
+            });
+            ui.label(RichText::new("Meaning").weak());
+            ui.horizontal(|ui| {
+                swatch(ui, palette.front, "Front");
+                ui.add_space(SPACE_XS);
+                swatch(ui, palette.back, "Back");
+            });
+            ui.end_row();
+        }
+        theme::input_row(ui, "Splat size", "Factor on the size of all splats (+ and −)", |ui| {
+            ui.add(
+                Slider::new(&mut settings.splat_scale, SPLAT_SCALES)
+                    .logarithmic(true)
+                    .fixed_decimals(2),
+            )
+        });
+        theme::input_row(ui, "Theme", "Light or dark", |ui| {
+            ComboBox::from_id_salt("theme")
+                .selected_text(settings.theme.label())
+                .show_ui(ui, |ui| {
+                    for each in ThemeChoice::ALL {
+                        ui.selectable_value(&mut settings.theme, each, each.label());
+                    }
+                })
+                .response
+        });
+    });
+}
+
+fn swatch(ui: &mut Ui, color: [f32; 3], label: &str) {
+    ui.spacing_mut().item_spacing.x = SPACE_S;
+    let (rect, _) = ui.allocate_exact_size(Vec2::splat(14.0), egui::Sense::hover());
+    let [r, g, b] = color.map(|channel| (channel * 255.0).round() as u8);
+    ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(r, g, b));
+    ui.label(label);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Short;
+
+    #[test]
+    fn lengths_have_about_four_digits() {
+        let check = |value, expect: &str| assert_eq!(Short(value).to_string(), expect);
+        check(0.0, "0.000000");
+        check(1.0, "1.000");
+        check(12.345_67, "12.35");
+        check(0.012_345, "0.01234");
+        check(123_456.0, "123456");
+        check(1.5e-7, "1.50e-7");
+        check(2.0e9, "2.00e9");
+    }
+}

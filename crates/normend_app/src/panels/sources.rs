@@ -1,0 +1,98 @@
+//! The list of sources: select, flip, remove, fly to. Only the rows in sight are laid out.
+
+use egui::{Button, Color32, RichText, ScrollArea, Ui, Vec2};
+use normend_core::sources::Origin;
+
+use crate::command::{Action, Command};
+use crate::session::Session;
+use crate::theme::{self, SPACE_S, SPACE_XS};
+
+const ROW_HEIGHT: f32 = 24.0;
+const LIST_HEIGHT: f32 = 240.0;
+
+/// The list and its buttons.
+pub fn ui(ui: &mut Ui, session: &Session) -> Option<Action> {
+    let sources = session.document.sources();
+    if sources.is_empty() {
+        let hint = "None yet. Click a wrong region in the view: it turns, and its point becomes a source.";
+        ui.add(egui::Label::new(RichText::new(hint).weak()).wrap());
+        return None;
+    }
+    let mut action = None;
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = SPACE_XS;
+        let n_selected = session.selected.len();
+        for command in [Command::FlipSources, Command::RemoveSources] {
+            let short = if command == Command::FlipSources {
+                "Flip"
+            } else {
+                "Remove"
+            };
+            let button = ui.add_enabled(n_selected > 0, Button::new(short));
+            let tooltip = format!("{} ({})", command.tooltip(), command.keys_text(ui.ctx()));
+            if button
+                .on_hover_text(tooltip)
+                .on_disabled_hover_text("Select sources first")
+                .clicked()
+            {
+                action = Some(command.into());
+            }
+        }
+        let one = session.selected.first().filter(|_| n_selected == 1);
+        let button = ui.add_enabled(one.is_some(), Button::new("Show"));
+        let button = button.on_hover_text("Bring this source into view");
+        if button.on_disabled_hover_text("Select one source first").clicked() {
+            action = one.map(|&point| Action::FlyTo(point));
+        }
+        if n_selected > 0 {
+            ui.label(RichText::new(format!("{} of {}", theme::thousands(n_selected as u64), sources.len())).weak());
+        }
+    });
+    ui.add_space(SPACE_XS);
+    ScrollArea::vertical()
+        .id_salt("sources")
+        .max_height(LIST_HEIGHT)
+        .auto_shrink([false, true])
+        .show_rows(ui, ROW_HEIGHT, sources.len(), |ui, rows| {
+            for source in sources.iter().skip(rows.start).take(rows.len()) {
+                let flipped = session.is_flipped(source);
+                let response = row(
+                    ui,
+                    source.point,
+                    flipped,
+                    source.origin,
+                    session.selected.contains(&source.point),
+                );
+                if response.double_clicked() {
+                    action = Some(Action::FlyTo(source.point));
+                } else if response.clicked() {
+                    let extend = ui.input(|input| input.modifiers.shift || input.modifiers.command);
+                    action = Some(Action::SelectSource {
+                        point: source.point,
+                        extend,
+                    });
+                }
+            }
+        });
+    action
+}
+
+fn row(ui: &mut Ui, point: u32, flipped: bool, origin: Origin, selected: bool) -> egui::Response {
+    let state = if flipped { "flipped" } else { "kept" };
+    let text = format!("      Point {}", theme::thousands(u64::from(point)));
+    let button = Button::selectable(selected, text)
+        .shortcut_text(format!("{state}, {}", origin.label()))
+        .min_size(Vec2::new(ui.available_width(), ROW_HEIGHT));
+    let response = ui
+        .add(button)
+        .on_hover_text("Click to select, double-click to bring into view");
+    let [r, g, b] = if flipped {
+        theme::SOURCE_FLIPPED
+    } else {
+        theme::SOURCE_KEPT
+    }
+    .map(|channel| (channel * 255.0).round() as u8);
+    let center = response.rect.left_center() + Vec2::new(SPACE_S + 8.0, 0.0);
+    ui.painter().circle_filled(center, 5.0, Color32::from_rgb(r, g, b));
+    response
+}

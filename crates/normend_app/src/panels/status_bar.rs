@@ -1,0 +1,53 @@
+//! One line about the scan, what a click would turn, and the graphics adapter.
+
+use egui::{Align, Layout, RichText, Ui};
+
+use crate::session::Session;
+use crate::theme::{self, SPACE_M};
+
+/// The status bar.
+pub fn ui(ui: &mut Ui, session: Option<&Session>, n_would_turn: Option<u64>, adapter: &str) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = SPACE_M;
+        match session {
+            Some(session) => {
+                for (index, fact) in facts(session).into_iter().enumerate() {
+                    if index > 0 {
+                        ui.label(RichText::new("·").weak());
+                    }
+                    ui.label(fact);
+                }
+            }
+            None => {
+                ui.label(RichText::new("No scan is open").weak());
+            }
+        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            ui.add(egui::Label::new(RichText::new(adapter).weak()).truncate())
+                .on_hover_text("The graphics adapter that draws the view");
+            if let Some(n_points) = n_would_turn {
+                ui.label(RichText::new("·").weak());
+                let text = format!("A click turns {}", theme::counted(n_points, "point", "points"));
+                ui.label(RichText::new(text).color(theme::accent(ui)));
+            }
+        });
+    });
+}
+
+fn facts(session: &Session) -> Vec<String> {
+    let mut facts = vec![theme::counted(session.scan.cloud.n_points() as u64, "point", "points")];
+    if session.scan.n_left_out > 0 {
+        let rows = theme::counted(session.scan.n_left_out as u64, "row", "rows");
+        facts.push(format!("{rows} left out (not finite)"));
+    }
+    if let Some(propagation) = session.document.propagation() {
+        let n_components = propagation.tree.roots().len() as u64;
+        facts.push(theme::counted(n_components, "component", "components"));
+    }
+    facts.push(theme::counted(
+        session.document.sources().len() as u64,
+        "source",
+        "sources",
+    ));
+    facts
+}

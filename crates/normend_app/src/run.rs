@@ -1,0 +1,170 @@
+//! Opening the window, and saying in words why that fails.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use anyhow::anyhow;
+use eframe::egui_wgpu::{WgpuConfiguration, WgpuSetupCreateNew};
+use normend_render::SplatRenderer;
+
+use crate::app::App;
+use crate::settings::SettingsStore;
+
+const MIN_SIZE: [f32; 2] = [900.0, 600.0];
+
+/// Opens the editor's window, with `scan` when one is given, and runs until it is closed.
+///
+/// # Errors
+/// In words for the user: no display, no graphics driver, and the package that gives it.
+pub fn run(scan: Option<PathBuf>) -> anyhow::Result<()> {
+    let (settings, problem) = SettingsStore::load();
+    let options = options(settings.settings.window_size);
+    // Missing libraries of the window system are panics of its bindings; they become words like all other errors.
+    let last_panic = Arc::new(Mutex::new(None));
+    let seen = Arc::clone(&last_panic);
+    let former_hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        *seen.lock().unwrap_or_else(PoisonError::into_inner) = Some(info.to_string());
+    }));
+    let outcome = catch_unwind(AssertUnwindSafe(|| {
+        eframe::run_native(
+            "Normend",
+            options,
+            Box::new(move |cc| Ok(Box::new(App::with_settings(cc, scan, settings, problem)))),
+        )
+    }));
+    std::panic::set_hook(former_hook);
+    match outcome {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(error)) => Err(anyhow!(in_words(&error.to_string()))),
+        Err(_) => {
+            let panic = last_panic.lock().unwrap_or_else(PoisonError::into_inner).take();
+            Err(anyhow!(in_words(
+                &panic.unwrap_or_else(|| "no reason given".to_owned())
+            )))
+        }
+    }
+}
+
+/// The graphics setup of the editor: its device has the adapter's own limits, so that large scans fit.
+pub fn graphics_setup() -> WgpuSetupCreateNew {
+    WgpuSetupCreateNew {
+        device_descriptor: Arc::new(SplatRenderer::device_descriptor),
+        ..WgpuSetupCreateNew::without_display_handle()
+    }
+}
+
+fn options(window_size: [f32; 2]) -> eframe::NativeOptions {
+    eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_title("Normend")
+            .with_app_id("normend")
+            .with_inner_size(window_size)
+            .with_min_inner_size(MIN_SIZE)
+            .with_icon(icon()),
+        renderer: eframe::Renderer::Wgpu,
+        wgpu_options: WgpuConfiguration {
+            wgpu_setup: graphics_setup().into(),
+            ..WgpuConfiguration::default()
+        },
+        ..eframe::NativeOptions::default()
+    }
+}
+
+/// A disc, half front and half back.
+fn icon() -> egui::IconData {
+    const SIDE: u32 = 64;
+    let mut rgba = Vec::with_capacity((SIDE * SIDE * 4) as usize);
+    for y in 0..SIDE {
+        for x in 0..SIDE {
+            let (dx, dy) = (x as f32 - 31.5, y as f32 - 31.5);
+            let coverage = (30.0 - (dx * dx + dy * dy).sqrt()).clamp(0.0, 1.0);
+            let [r, g, b] = if dx + dy < 0.0 { [97, 153, 230] } else { [245, 140, 38] };
+            rgba.extend([r, g, b, (coverage * 255.0) as u8]);
+        }
+    }
+    egui::IconData {
+        rgba,
+        width: SIDE,
+        height: SIDE,
+    }
+}
+
+/// What the user can do about an error of the window system or the graphics driver.
+fn in_words(error: &str) -> String {
+    let has = |words: &[&str]| words.iter().any(|word| error.contains(word));
+    if has(&[
+        "neither WAYLAND_DISPLAY nor",
+        "could not open display",
+        "Failed to open connection to X server",
+    ]) || has(&["XOpenDisplayFailed", "NoCompositor", "BadDisplay"])
+    {
+        "The editor needs a display, and there is none: DISPLAY and WAYLAND_DISPLAY name no running desktop. \
+         Start it from a desktop session; `normend orient` and `normend render` work without a display."
+            .to_owned()
+    } else if has(&[
+        "libxkbcommon",
+        "xlib's shared libraries",
+        "libX11",
+        "libXcursor",
+        "libXi",
+        "libxcb",
+        "libwayland",
+    ]) {
+        format!(
+            "The editor cannot open a window because a library of the desktop is missing ({}). On Debian and Ubuntu: \
+             apt install libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon0 libxkbcommon-x11-0 libwayland-client0",
+            first_line(error)
+        )
+    } else if has(&[
+        "surface for any enabled backend",
+        "No suitable",
+        "NoAdapter",
+        "adapter",
+        "WGPU error",
+    ]) {
+        format!(
+            "The editor found no graphics driver that it can use ({}). On Debian and Ubuntu: \
+             apt install libvulkan1 mesa-vulkan-drivers",
+            first_line(error)
+        )
+    } else {
+        format!("The editor had to stop because of an error that it does not know: {error}")
+    }
+}
+
+fn first_line(text: &str) -> &str {
+    text.lines()
+        .rev()
+        .map(str::trim)
+        .find(|line| !line.is_empty())
+        .unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_name_the_remedy() {
+        let check = |error, expect: &str| {
+            let words = in_words(error);
+            assert!(words.contains(expect), "{error}: {words}");
+        };
+        check(
+            "winit EventLoopError: os error: neither WAYLAND_DISPLAY nor WAYLAND_SOCKET nor DISPLAY is set.",
+            "needs a display",
+        );
+        check(
+            "panicked at src/x.rs:1:1:\nLibrary libxkbcommon-x11.so could not be loaded.",
+            "libxkbcommon-x11-0",
+        );
+        check("Failed to load one of xlib's shared libraries", "libx11-6");
+        check(
+            "WGPU error: Failed to create surface for any enabled backend: {}",
+            "mesa-vulkan-drivers",
+        );
+        check("something else", "something else");
+    }
+}

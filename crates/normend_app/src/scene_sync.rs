@@ -1,0 +1,300 @@
+//! The picture of the document: the only place that turns a core [`Change`] into GPU ranges.
+//!
+//! The splats are uploaded in the tree's preorder, so an instance of the renderer is a position of the tree and the
+//! ranges of a [`Change`] are the ranges that the renderer turns. Source spheres follow the document's sources.
+
+use std::collections::BTreeSet;
+
+use eframe::egui_wgpu::RenderState;
+use egui::TextureId;
+use glam::Vec3;
+use normend_core::{Change, PointCloud};
+use normend_render::{Camera, DrawSettings, Hit, PickRequest, RenderError, Sphere, SplatRenderer, wgpu};
+
+use crate::session::Session;
+use crate::theme;
+
+/// What is under the pointer, in the document's words.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// A point of the scan.
+    Point {
+        /// The point's id.
+        point: u32,
+        /// Where its splat is seen, in world space.
+        position: Vec3,
+    },
+    /// The sphere of a source.
+    Source {
+        /// The id of the source's point.
+        point: u32,
+        /// Where the sphere is seen, in world space.
+        position: Vec3,
+    },
+}
+
+impl Target {
+    /// Where it is seen, in world space.
+    pub fn position(self) -> Vec3 {
+        match self {
+            Self::Point { position, .. } | Self::Source { position, .. } => position,
+        }
+    }
+}
+
+/// Everything that decides which splat is at which pixel; while it is equal, an earlier pick still holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Geometry {
+    camera: Camera,
+    size: [u32; 2],
+    pixels_per_point: f32,
+    splat_scale: f32,
+    stride: u32,
+}
+
+/// The renderer, its texture, and what it shows.
+pub struct Scene {
+    renderer: SplatRenderer,
+    state: RenderState,
+    texture: Option<(TextureId, u64)>,
+    /// Points by instance; empty while instances are points.
+    points: Vec<u32>,
+    /// Points of the source spheres, in the renderer's order.
+    source_points: Vec<u32>,
+    geometry: Option<Geometry>,
+    picture_id: u64,
+    ids_version: u64,
+    /// The ids that the last picture was drawn with.
+    drawn_ids_version: u64,
+}
+
+impl Scene {
+    /// A scene without points on eframe's device.
+    pub fn new(state: RenderState) -> Self {
+        Self {
+            renderer: SplatRenderer::new(&state.device),
+            state,
+            texture: None,
+            points: Vec::new(),
+            source_points: Vec::new(),
+            geometry: None,
+            picture_id: 0,
+            ids_version: 0,
+            drawn_ids_version: 0,
+        }
+    }
+
+    /// Shows nothing.
+    pub fn clear(&mut self) {
+        self.renderer.clear_cloud();
+        self.forget_ids();
+        self.renderer.set_spheres(&self.state.device, &self.state.queue, &[]);
+    }
+
+    /// Shows points that were just read: no normals yet, one radius for all.
+    ///
+    /// # Errors
+    /// [`RenderError`] when the graphics adapter cannot hold them.
+    pub fn show_points(&mut self, cloud: &PointCloud) -> Result<(), RenderError> {
+        self.clear();
+        let radii = vec![even_radius(cloud); cloud.n_points()];
+        self.renderer.set_cloud(
+            &self.state.device,
+            &self.state.queue,
+            cloud.positions(),
+            None,
+            &radii,
+            None,
+        )
+    }
+
+    /// Shows the document in full after a propagation was installed: O(points). Without one, does nothing.
+    ///
+    /// # Errors
+    /// [`RenderError`] when the graphics adapter cannot hold it.
+    pub fn show_document(&mut self, session: &Session) -> Result<(), RenderError> {
+        let document = &session.document;
+        let (Some(propagation), Some(orientation)) = (document.propagation(), document.orientation()) else {
+            return Ok(());
+        };
+        self.forget_ids();
+        self.points = propagation.tree.order().to_vec();
+        let (device, queue) = (&self.state.device, &self.state.queue);
+        let positions = document.cloud().positions();
+        self.renderer.set_highlight(device, queue, &[]);
+        self.renderer.set_cloud(
+            device,
+            queue,
+            positions,
+            Some(&propagation.normals),
+            &propagation.splat_radii,
+            Some(&self.points),
+        )?;
+        self.renderer.set_turned(queue, &orientation.to_words());
+        self.show_sources(session);
+        Ok(())
+    }
+
+    /// Shows what an edit, an undo or a redo turned, and the sources after it.
+    pub fn apply(&mut self, change: &Change, session: &Session) {
+        self.renderer.turn(&self.state.queue, change.ranges());
+        self.show_sources(session);
+    }
+
+    /// Highlights what a click would turn, or nothing.
+    pub fn highlight(&mut self, change: Option<&Change>) {
+        let ranges = change.map_or(&[][..], Change::ranges);
+        self.renderer
+            .set_highlight(&self.state.device, &self.state.queue, ranges);
+    }
+
+    /// Shows the sources as spheres: green where the stored normal was kept, pink where it was flipped.
+    pub fn show_sources(&mut self, session: &Session) {
+        let positions = session.document.cloud().positions();
+        let selected: &BTreeSet<u32> = &session.selected;
+        let (points, spheres): (Vec<u32>, Vec<Sphere>) = session
+            .document
+            .sources()
+            .iter()
+            .filter_map(|source| {
+                let color = if session.is_flipped(source) {
+                    theme::SOURCE_FLIPPED
+                } else {
+                    theme::SOURCE_KEPT
+                };
+                let center = *positions.get(source.point as usize)?;
+                Some((
+                    source.point,
+                    Sphere {
+                        center,
+                        color,
+                        selected: selected.contains(&source.point),
+                    },
+                ))
+            })
+            .unzip();
+        if points != self.source_points {
+            // Spheres cover other pixels now: earlier picks no longer hold.
+            self.source_points = points;
+            self.picture_id += 1;
+            self.ids_version += 1;
+        }
+        self.renderer
+            .set_spheres(&self.state.device, &self.state.queue, &spheres);
+    }
+
+    fn forget_ids(&mut self) {
+        self.points.clear();
+        self.source_points.clear();
+        self.picture_id += 1;
+        self.ids_version += 1;
+    }
+
+    /// Draws if anything changed and returns the picture for egui. `size` in physical pixels.
+    pub fn draw(
+        &mut self,
+        camera: &Camera,
+        size: [u32; 2],
+        pixels_per_point: f32,
+        settings: &DrawSettings,
+    ) -> Option<TextureId> {
+        let geometry = Geometry {
+            camera: *camera,
+            size,
+            pixels_per_point,
+            splat_scale: settings.splat_scale,
+            stride: settings.stride,
+        };
+        if self.geometry != Some(geometry) {
+            self.geometry = Some(geometry);
+            self.picture_id += 1;
+        }
+        self.renderer.draw(
+            &self.state.device,
+            &self.state.queue,
+            camera,
+            size,
+            pixels_per_point,
+            settings,
+        );
+        self.drawn_ids_version = self.ids_version;
+        let (view, version) = self.renderer.picture()?;
+        let mut egui_renderer = self.state.renderer.write();
+        let filter = wgpu::FilterMode::Nearest;
+        let id = match self.texture {
+            Some((id, shown)) if shown == version => id,
+            Some((id, _)) => {
+                egui_renderer.update_egui_texture_from_wgpu_texture(&self.state.device, view, filter, id);
+                id
+            }
+            None => egui_renderer.register_native_texture(&self.state.device, view, filter),
+        };
+        self.texture = Some((id, version));
+        Some(id)
+    }
+
+    /// A number for the present assignment of points to pixels: while it is equal, an earlier pick still holds.
+    pub fn picture_id(&self) -> u64 {
+        self.picture_id
+    }
+
+    /// A number for the meaning of the ids in a picture: the answer to a pick is read with the one it was asked with.
+    pub fn ids_version(&self) -> u64 {
+        self.ids_version
+    }
+
+    /// Asks what the last picture shows at `pixel` (physical, from the top left of the view). `None` while that picture
+    /// is older than the ids; it is drawn anew in the next frame.
+    pub fn pick(&self, pixel: [u32; 2]) -> Option<PickRequest> {
+        if self.drawn_ids_version != self.ids_version {
+            return None;
+        }
+        self.renderer.pick(&self.state.device, &self.state.queue, pixel)
+    }
+
+    /// The answer of a pick: `None` while under way, `Some(None)` for background. Never blocks.
+    pub fn poll(&self, request: &mut PickRequest) -> Option<Option<Target>> {
+        let hit = request.poll(&self.state.device)?;
+        Some(hit.and_then(|hit| self.target(hit)))
+    }
+
+    fn target(&self, hit: Hit) -> Option<Target> {
+        match hit {
+            Hit::Splat {
+                instance,
+                point: position,
+            } => {
+                let point = if self.points.is_empty() {
+                    Some(instance)
+                } else {
+                    self.points.get(instance as usize).copied()
+                };
+                point.map(|point| Target::Point { point, position })
+            }
+            Hit::Sphere { index, point: position } => self
+                .source_points
+                .get(index as usize)
+                .map(|&point| Target::Source { point, position }),
+        }
+    }
+
+    /// Reads the last picture back: width, height, and RGBA rows from the top. Blocks; for tests and screenshots.
+    pub fn read_picture(&self) -> Option<([u32; 2], Vec<u8>)> {
+        self.renderer.read_picture(&self.state.device, &self.state.queue)
+    }
+}
+
+/// A radius that roughly closes a surface of the bounding box's size, until neighbors are known.
+fn even_radius(cloud: &PointCloud) -> f32 {
+    let (min, max) = cloud.bounding_box();
+    let sides = max - min;
+    let area = 2.0 * (sides.x * sides.y + sides.y * sides.z + sides.z * sides.x);
+    let n_points = cloud.n_points().max(1) as f32;
+    let radius = 0.5 * (area / n_points).sqrt();
+    // A line or a single place has no area.
+    if radius > 0.0 {
+        radius
+    } else {
+        (sides.length() / n_points).max(f32::MIN_POSITIVE)
+    }
+}

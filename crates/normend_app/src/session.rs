@@ -1,0 +1,131 @@
+//! One open scan: the file, the document made of it, and what the user has chosen but not applied yet.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use normend_core::{Change, Document, Edit, EditError, Parameters, Source, Start};
+use normend_io::Scan;
+
+/// An open scan.
+pub struct Session {
+    /// The file.
+    pub scan: Arc<Scan>,
+    /// Its name, without folders.
+    pub name: String,
+    /// Cloud, parameters, sources, history.
+    pub document: Document,
+    /// The parameters that the panel shows; applied by Propagate.
+    pub draft: Parameters,
+    /// The parameters of the running propagation, or of the last one when none runs.
+    pub requested: Parameters,
+    /// Points whose source is selected.
+    pub selected: BTreeSet<u32>,
+    saved_revision: u64,
+}
+
+impl Session {
+    /// A session for a scan that was just read. Given normals are kept as the start: they may come from another
+    /// program, and mending them is what the user came for.
+    pub fn new(scan: Scan, name: String) -> Self {
+        let document = Document::new(Arc::clone(&scan.cloud), scan.given_normals.clone());
+        let parameters = Parameters {
+            start: if scan.given_normals.is_some() {
+                Start::Keep
+            } else {
+                Start::Estimate
+            },
+            ..Parameters::default()
+        };
+        Self {
+            saved_revision: document.revision(),
+            scan: Arc::new(scan),
+            name,
+            document,
+            draft: parameters,
+            requested: parameters,
+            selected: BTreeSet::new(),
+        }
+    }
+
+    /// Whether there are mends that no exported file has.
+    pub fn is_unsaved(&self) -> bool {
+        self.document.revision() != self.saved_revision
+    }
+
+    /// Remembers that the sources of `revision` are in an exported file.
+    pub fn mark_saved(&mut self, revision: u64) {
+        self.saved_revision = revision;
+    }
+
+    /// Applies an edit and keeps the selection to points that are sources.
+    ///
+    /// # Errors
+    /// As [`Document::apply`].
+    pub fn apply(&mut self, edit: Edit) -> Result<Change, EditError> {
+        let change = self.document.apply(edit)?;
+        self.prune_selection();
+        Ok(change)
+    }
+
+    /// Takes the last edit back.
+    pub fn undo(&mut self) -> Option<Change> {
+        let change = self.document.undo();
+        self.prune_selection();
+        change
+    }
+
+    /// Applies the last undone edit again.
+    pub fn redo(&mut self) -> Option<Change> {
+        let change = self.document.redo();
+        self.prune_selection();
+        change
+    }
+
+    fn prune_selection(&mut self) {
+        let sources = self.document.sources();
+        self.selected.retain(|&point| sources.get(point).is_some());
+    }
+
+    /// Whether the stored normal at `source` is against the vouched direction, so that its point is drawn flipped.
+    pub fn is_flipped(&self, source: &Source) -> bool {
+        self.document
+            .propagation()
+            .and_then(|propagation| propagation.normals.get(source.point as usize))
+            .is_some_and(|normal| normal.dot(source.normal) < 0.0)
+    }
+
+    /// The rule that decided the sides, for the exported file's comment.
+    pub fn rule(&self) -> String {
+        let start = match self.document.parameters().start {
+            Start::Keep if self.scan.given_normals.is_some() => "as given",
+            Start::Keep | Start::Estimate => "farthest along +z up",
+        };
+        match self.document.sources().len() {
+            0 => start.to_owned(),
+            1 => format!("{start}, 1 source"),
+            n_sources => format!("{start}, {n_sources} sources"),
+        }
+    }
+
+    /// Where an export goes unless the user says otherwise: `<name>_oriented.ply` in `folder`, or beside the scan.
+    pub fn suggested_export(&self, folder: Option<&Path>) -> PathBuf {
+        let name = Path::new(&self.name);
+        let stem = name.file_stem().unwrap_or_default().to_string_lossy();
+        let extension = name.extension().map_or_else(
+            || {
+                self.scan
+                    .format
+                    .extensions()
+                    .first()
+                    .copied()
+                    .unwrap_or("ply")
+                    .to_owned()
+            },
+            |extension| extension.to_string_lossy().into_owned(),
+        );
+        let beside = self.scan.path().and_then(|path| path.parent()).map(Path::to_path_buf);
+        let folder = folder.map(Path::to_path_buf).or(beside).unwrap_or_default();
+        folder.join(format!("{stem}_oriented.{extension}"))
+    }
+}

@@ -1,0 +1,309 @@
+//! How the editor looks: one spacing scale, two themes, and the helpers that keep columns aligned.
+
+use egui::{Color32, CornerRadius, FontFamily, FontId, Margin, RichText, Stroke, TextStyle, Theme, Ui, Vec2};
+use normend_render::Palette;
+
+use crate::settings::PaletteChoice;
+
+/// Between things that belong together, in points.
+pub const SPACE_XS: f32 = 4.0;
+/// Between rows and columns.
+pub const SPACE_S: f32 = 8.0;
+/// Around the content of panels and windows.
+pub const SPACE_M: f32 = 12.0;
+/// Between sections.
+pub const SPACE_L: f32 = 16.0;
+
+/// Width of the side panel, in points.
+pub const SIDE_PANEL_WIDTH: f32 = 288.0;
+/// Width of the first column of label/value rows, in points.
+pub const LABEL_WIDTH: f32 = 104.0;
+
+/// Color of a source whose stored normal was kept.
+pub const SOURCE_KEPT: [f32; 3] = [0.18, 0.72, 0.36];
+/// Color of a source whose stored normal was flipped.
+pub const SOURCE_FLIPPED: [f32; 3] = [0.93, 0.35, 0.68];
+
+/// The colors of one theme that are not egui's own names.
+struct Colors {
+    text: Color32,
+    strong_text: Color32,
+    weak_text: Color32,
+    panel: Color32,
+    field: Color32,
+    button: Color32,
+    button_hovered: Color32,
+    button_active: Color32,
+    line: Color32,
+    accent: Color32,
+    selection: Color32,
+    faint: Color32,
+    warning: Color32,
+    error: Color32,
+}
+
+const DARK: Colors = Colors {
+    text: Color32::from_rgb(0xd3, 0xd8, 0xde),
+    strong_text: Color32::from_rgb(0xf4, 0xf6, 0xf8),
+    weak_text: Color32::from_rgb(0x9a, 0xa3, 0xae),
+    panel: Color32::from_rgb(0x1d, 0x20, 0x25),
+    field: Color32::from_rgb(0x13, 0x15, 0x19),
+    button: Color32::from_rgb(0x2c, 0x31, 0x38),
+    button_hovered: Color32::from_rgb(0x39, 0x40, 0x4a),
+    button_active: Color32::from_rgb(0x45, 0x4e, 0x5a),
+    line: Color32::from_rgb(0x35, 0x3b, 0x44),
+    accent: Color32::from_rgb(0x6c, 0xa8, 0xf7),
+    selection: Color32::from_rgb(0x24, 0x4f, 0x86),
+    faint: Color32::from_rgb(0x24, 0x28, 0x2e),
+    warning: Color32::from_rgb(0xe8, 0xa9, 0x4c),
+    error: Color32::from_rgb(0xff, 0x7b, 0x72),
+};
+
+const LIGHT: Colors = Colors {
+    text: Color32::from_rgb(0x2b, 0x31, 0x38),
+    strong_text: Color32::from_rgb(0x0f, 0x13, 0x18),
+    weak_text: Color32::from_rgb(0x5a, 0x63, 0x6e),
+    panel: Color32::from_rgb(0xf5, 0xf6, 0xf8),
+    field: Color32::from_rgb(0xff, 0xff, 0xff),
+    button: Color32::from_rgb(0xe3, 0xe6, 0xea),
+    button_hovered: Color32::from_rgb(0xd6, 0xda, 0xe0),
+    button_active: Color32::from_rgb(0xc6, 0xcc, 0xd4),
+    line: Color32::from_rgb(0xcf, 0xd4, 0xda),
+    accent: Color32::from_rgb(0x1a, 0x5f, 0xb4),
+    selection: Color32::from_rgb(0xbf, 0xd8, 0xf7),
+    faint: Color32::from_rgb(0xec, 0xee, 0xf1),
+    warning: Color32::from_rgb(0x8f, 0x54, 0x00),
+    error: Color32::from_rgb(0xb4, 0x23, 0x18),
+};
+
+fn colors(dark: bool) -> &'static Colors {
+    if dark { &DARK } else { &LIGHT }
+}
+
+/// Sets fonts, spacing and colors of both themes, and what counts as a click.
+pub fn apply(ctx: &egui::Context) {
+    ctx.all_styles_mut(|style| {
+        let font = |size| FontId::new(size, FontFamily::Proportional);
+        style.text_styles = [
+            (TextStyle::Heading, font(22.0)),
+            (TextStyle::Body, font(14.0)),
+            (TextStyle::Button, font(14.0)),
+            (TextStyle::Small, font(12.0)),
+            (TextStyle::Monospace, FontId::new(13.0, FontFamily::Monospace)),
+        ]
+        .into();
+        style.spacing.item_spacing = Vec2::new(SPACE_S, SPACE_S);
+        style.spacing.button_padding = Vec2::new(SPACE_M, SPACE_XS);
+        style.spacing.window_margin = Margin::same(SPACE_L as i8);
+        style.spacing.menu_margin = Margin::same(SPACE_XS as i8);
+        style.spacing.interact_size = Vec2::new(40.0, 26.0);
+        style.spacing.combo_width = 132.0;
+        style.spacing.slider_width = 104.0;
+        style.interaction.selectable_labels = false;
+    });
+    for theme in [Theme::Dark, Theme::Light] {
+        ctx.style_mut_of(theme, |style| style.visuals = visuals(theme));
+    }
+    ctx.options_mut(|options| {
+        // A press that moves farther is a drag of the camera, not a mend; a press may be as long as it likes.
+        options.input_options.max_click_dist = 4.0;
+        options.input_options.max_click_duration = 60.0;
+    });
+}
+
+fn visuals(theme: Theme) -> egui::Visuals {
+    let dark = theme == Theme::Dark;
+    let colors = colors(dark);
+    let mut visuals = if dark {
+        egui::Visuals::dark()
+    } else {
+        egui::Visuals::light()
+    };
+    visuals.panel_fill = colors.panel;
+    visuals.window_fill = colors.panel;
+    visuals.window_stroke = Stroke::new(1.0, colors.line);
+    visuals.extreme_bg_color = colors.field;
+    visuals.faint_bg_color = colors.faint;
+    visuals.weak_text_color = Some(colors.weak_text);
+    visuals.hyperlink_color = colors.accent;
+    visuals.warn_fg_color = colors.warning;
+    visuals.error_fg_color = colors.error;
+    visuals.selection.bg_fill = colors.selection;
+    visuals.selection.stroke = Stroke::new(1.0, colors.strong_text);
+    visuals.window_corner_radius = CornerRadius::same(8);
+    visuals.menu_corner_radius = CornerRadius::same(6);
+    let widgets = &mut visuals.widgets;
+    for (state, fill, text) in [
+        (&mut widgets.noninteractive, colors.panel, colors.text),
+        (&mut widgets.inactive, colors.button, colors.text),
+        (&mut widgets.hovered, colors.button_hovered, colors.strong_text),
+        (&mut widgets.active, colors.button_active, colors.strong_text),
+        (&mut widgets.open, colors.button_hovered, colors.strong_text),
+    ] {
+        state.bg_fill = fill;
+        state.weak_bg_fill = fill;
+        state.bg_stroke = Stroke::new(1.0, colors.line);
+        state.fg_stroke = Stroke::new(1.0, text);
+        state.corner_radius = CornerRadius::same(4);
+        state.expansion = 0.0;
+    }
+    visuals
+}
+
+/// The colors of the 3D view; blue and orange stand before the theme's own background.
+pub fn palette(choice: PaletteChoice, dark: bool) -> Palette {
+    match choice {
+        PaletteChoice::BlueOrange => Palette {
+            background: if dark {
+                [0.085, 0.095, 0.11]
+            } else {
+                [0.88, 0.895, 0.915]
+            },
+            ..Palette::BLUE_ORANGE
+        },
+        PaletteChoice::Paper => Palette::PAPER,
+    }
+}
+
+/// The color of what the user should notice.
+pub fn accent(ui: &Ui) -> Color32 {
+    colors(ui.visuals().dark_mode).accent
+}
+
+/// The fill behind cards that float over the 3D view.
+pub fn card(ui: &Ui) -> egui::Frame {
+    egui::Frame::new()
+        .fill(ui.visuals().window_fill)
+        .stroke(ui.visuals().window_stroke)
+        .corner_radius(CornerRadius::same(8))
+        .inner_margin(Margin::symmetric(SPACE_L as i8, SPACE_M as i8))
+        .shadow(ui.visuals().popup_shadow)
+}
+
+/// The frame of panels.
+pub fn panel_frame(style: &egui::Style) -> egui::Frame {
+    egui::Frame::new()
+        .fill(style.visuals.panel_fill)
+        .inner_margin(Margin::symmetric(SPACE_M as i8, SPACE_XS as i8))
+}
+
+/// A section of the side panel: a heading, its rows, and room below.
+pub fn section<R>(ui: &mut Ui, title: &str, rows: impl FnOnce(&mut Ui) -> R) -> R {
+    let text = RichText::new(title)
+        .size(15.0)
+        .color(ui.visuals().strong_text_color())
+        .strong();
+    ui.add(egui::Label::new(text));
+    ui.add_space(SPACE_XS);
+    let result = rows(ui);
+    ui.add_space(SPACE_L);
+    result
+}
+
+/// Label/value rows whose columns align in every section.
+pub fn rows<R>(ui: &mut Ui, id: &str, add_rows: impl FnOnce(&mut Ui) -> R) -> R {
+    egui::Grid::new(id)
+        .num_columns(2)
+        .min_col_width(LABEL_WIDTH)
+        .spacing([SPACE_S, SPACE_S])
+        .show(ui, add_rows)
+        .inner
+}
+
+/// One label/value row of [`rows`].
+pub fn row(ui: &mut Ui, label: &str, value: impl Into<String>) {
+    ui.label(RichText::new(label).weak());
+    ui.add(egui::Label::new(value.into()).truncate());
+    ui.end_row();
+}
+
+/// One row of [`rows`] with an input, which takes its accessible name from the label.
+pub fn input_row(ui: &mut Ui, label: &str, tooltip: &str, add_input: impl FnOnce(&mut Ui) -> egui::Response) {
+    let name = ui.label(RichText::new(label).weak()).on_hover_text(tooltip);
+    add_input(ui).labelled_by(name.id).on_hover_text(tooltip);
+    ui.end_row();
+}
+
+/// A button for the one thing to do next.
+pub fn primary_button(ui: &Ui, text: &str) -> egui::Button<'static> {
+    let (fill, text_color) = if ui.visuals().dark_mode {
+        (Color32::from_rgb(0x2d, 0x6c, 0xc4), Color32::WHITE)
+    } else {
+        (Color32::from_rgb(0x1a, 0x5f, 0xb4), Color32::WHITE)
+    };
+    egui::Button::new(RichText::new(text.to_owned()).color(text_color)).fill(fill)
+}
+
+/// `1234567` as "1,234,567".
+pub fn thousands(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
+    for (index, digit) in digits.char_indices() {
+        if index > 0 && (digits.len() - index) % 3 == 0 {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// "1 point", "2,000 points".
+pub fn counted(number: u64, singular: &str, plural: &str) -> String {
+    format!("{} {}", thousands(number), if number == 1 { singular } else { plural })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_separators() {
+        let check = |number, expect: &str| assert_eq!(thousands(number), expect);
+        check(0, "0");
+        check(999, "999");
+        check(1000, "1,000");
+        check(1_234_567, "1,234,567");
+        check(u64::MAX, "18,446,744,073,709,551,615");
+        assert_eq!(counted(1, "point", "points"), "1 point");
+        assert_eq!(counted(2000, "point", "points"), "2,000 points");
+    }
+
+    /// Contrast ratio of the Web Content Accessibility Guidelines 2.1.
+    fn contrast(a: Color32, b: Color32) -> f32 {
+        let luminance = |color: Color32| {
+            let linear = |byte: u8| {
+                let value = f32::from(byte) / 255.0;
+                if value <= 0.04045 {
+                    value / 12.92
+                } else {
+                    ((value + 0.055) / 1.055).powf(2.4)
+                }
+            };
+            0.2126 * linear(color.r()) + 0.7152 * linear(color.g()) + 0.0722 * linear(color.b())
+        };
+        let (a, b) = (luminance(a), luminance(b));
+        (a.max(b) + 0.05) / (a.min(b) + 0.05)
+    }
+
+    #[test]
+    fn text_is_readable_in_both_themes() {
+        for (name, colors) in [("dark", &DARK), ("light", &LIGHT)] {
+            for (what, text, back) in [
+                ("text", colors.text, colors.panel),
+                ("strong", colors.strong_text, colors.panel),
+                ("weak", colors.weak_text, colors.panel),
+                ("weak on field", colors.weak_text, colors.field),
+                ("button", colors.text, colors.button),
+                ("hovered", colors.strong_text, colors.button_hovered),
+                ("active", colors.strong_text, colors.button_active),
+                ("selected", colors.strong_text, colors.selection),
+                ("warning", colors.warning, colors.panel),
+                ("error", colors.error, colors.panel),
+                ("accent", colors.accent, colors.panel),
+            ] {
+                let ratio = contrast(text, back);
+                assert!(ratio >= 4.5, "{what} in the {name} theme has contrast {ratio:.2}");
+            }
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! The work that runs beside the window: opening, propagating, exporting; one at a time.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use normend_core::{Document, Parameters, PointCloud, Propagation};
+use normend_io::{ReadError, Scan, WriteError, WriteOptions};
+
+use crate::job::{Job, JobError, JobStatus};
+use crate::session::Session;
+
+/// Where a scan comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ScanOrigin {
+    /// A file.
+    File(PathBuf),
+    /// The scan that comes with the program.
+    Sample,
+}
+
+const SAMPLE: &[u8] = &[] /* SAMPLE */;
+const SAMPLE_NAME: &str = "sample.ply";
+
+impl ScanOrigin {
+    /// The file's name without folders.
+    pub fn name(&self) -> String {
+        match self {
+            Self::File(path) => path
+                .file_name()
+                .unwrap_or(path.as_os_str())
+                .to_string_lossy()
+                .into_owned(),
+            Self::Sample => SAMPLE_NAME.to_owned(),
+        }
+    }
+}
+
+/// The running job with what is needed when it ends.
+pub enum Work {
+    /// A scan is read.
+    Open {
+        /// The reading.
+        job: Job<Scan>,
+        /// Where from.
+        origin: ScanOrigin,
+    },
+    /// The open scan is oriented.
+    Propagate(Job<Propagation>),
+    /// The open scan is written.
+    Export {
+        /// The writing.
+        job: Job<()>,
+        /// Where to.
+        path: PathBuf,
+        /// The document's revision that is written.
+        revision: u64,
+    },
+}
+
+impl Work {
+    /// Starts to read a scan.
+    pub fn open(ctx: &egui::Context, origin: ScanOrigin) -> Self {
+        let source = origin.clone();
+        let job = Job::start(ctx, "open", "Reading", move |progress| {
+            let scan = match &source {
+                ScanOrigin::File(path) => normend_io::read(path, progress),
+                ScanOrigin::Sample => normend_io::read_bytes(SAMPLE.to_vec(), SAMPLE_NAME, progress),
+            };
+            scan.map_err(|error| match error {
+                ReadError::Cancelled(_) => JobError::Cancelled,
+                error => JobError::Failed(error.to_string()),
+            })
+        });
+        Self::Open { job, origin }
+    }
+
+    /// Starts to orient `document` with `parameters`.
+    pub fn propagate(ctx: &egui::Context, document: &Document, parameters: Parameters) -> Self {
+        let cloud: Arc<PointCloud> = Arc::clone(document.cloud());
+        let given = document.given_normals().cloned();
+        Self::Propagate(Job::start(ctx, "propagate", "Finding neighbors", move |progress| {
+            let given = given.as_ref().map(|normals| normals.as_slice());
+            Ok(Propagation::new(&cloud, given, parameters, progress)?)
+        }))
+    }
+
+    /// Starts to write the oriented scan; `None` when it is not oriented yet.
+    pub fn export(ctx: &egui::Context, session: &Session, path: &Path, overwrite_input: bool) -> Option<Self> {
+        let normals = session.document.oriented_normals()?;
+        let scan = Arc::clone(&session.scan);
+        let options = WriteOptions {
+            rule: session.rule(),
+            overwrite_input,
+        };
+        let target = path.to_path_buf();
+        let job = Job::start(ctx, "export", "Writing", move |progress| {
+            scan.write(&normals, &target, &options, progress)
+                .map_err(|error| match error {
+                    WriteError::Cancelled(_) => JobError::Cancelled,
+                    error => JobError::Failed(error.to_string()),
+                })
+        });
+        Some(Self::Export {
+            job,
+            path: path.to_path_buf(),
+            revision: session.document.revision(),
+        })
+    }
+
+    /// What is done, for the card.
+    pub fn title(&self) -> String {
+        match self {
+            Self::Open { origin, .. } => format!("Opening {}", origin.name()),
+            Self::Propagate(_) => "Orienting normals".to_owned(),
+            Self::Export { path, .. } => {
+                format!(
+                    "Exporting {}",
+                    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy()
+                )
+            }
+        }
+    }
+
+    /// How far it is.
+    pub fn status(&self) -> JobStatus {
+        match self {
+            Self::Open { job, .. } => job.status(),
+            Self::Propagate(job) => job.status(),
+            Self::Export { job, .. } => job.status(),
+        }
+    }
+
+    /// Asks it to stop.
+    pub fn cancel(&self) {
+        match self {
+            Self::Open { job, .. } => job.cancel(),
+            Self::Propagate(job) => job.cancel(),
+            Self::Export { job, .. } => job.cancel(),
+        }
+    }
+}
