@@ -2,6 +2,13 @@
 
 const MODE_NORMALS: u32 = 1u;
 
+// Splats are edge-on below this cosine between normal and direction to the eye.
+const EDGE_ON: f32 = 0.2;
+// Where an edge-on splat looks for the surface beside it, in pixels.
+const BESIDE: i32 = 3;
+// How far nearer that surface may be, in lengths of a pixel.
+const BESIDE_DEPTH: f32 = 64.0;
+
 // Darkness of creases and of what lies behind an edge.
 const CREASE_STRENGTH: f32 = 60.0;
 const CREASE_LIMIT: f32 = 0.008;
@@ -99,21 +106,53 @@ fn sphere_color(id: u32, surface: u32) -> vec3<f32> {
     return sphere.color * light * mix(1.0, 0.22, rim);
 }
 
-fn splat_color(instance: u32, surface: u32, depth: f32) -> vec3<f32> {
+// The cosine between oriented normal and direction to the eye: positive on the front.
+fn signed_cosine(id: u32, surface: u32) -> f32 {
+    let code = surface >> 22u;
+    let cosine = f32(code & 511u) / 511.0;
+    return select(-cosine, cosine, (code < 512u) != is_turned(id - 1u));
+}
+
+fn signed_cosine_beside(pixel: vec2<i32>, depth: f32) -> f32 {
+    let at = clamp(pixel, vec2<i32>(0), vec2<i32>(frame.size) - 1);
+    let there = textureLoad(seen, at, 0).xy;
+    if !is_splat(there.x) {
+        return 0.0;
+    }
+    let nearer = depth - depth_of(there.y);
+    let pixel_len = frame.pixel_len * select(1.0, depth, frame.perspective > 0.5);
+    let surface = textureLoad(surfaces, at, 0).x;
+    if nearer <= 0.0 || nearer > BESIDE_DEPTH * pixel_len || !has_normal(surface) {
+        return 0.0;
+    }
+    return signed_cosine(there.x, surface);
+}
+
+// Whether the front is seen. Along the outline of a surface, discs just past the horizon stick out and would speckle
+// it with the other side. So a splat that is edge-on takes the side of the surface that curves away from the eye there.
+fn is_front(pixel: vec2<i32>, id: u32, surface: u32, depth: f32) -> bool {
+    let own = signed_cosine(id, surface);
+    if abs(own) >= EDGE_ON {
+        return own > 0.0;
+    }
+    let horizontal = signed_cosine_beside(pixel - vec2<i32>(BESIDE, 0), depth)
+        + signed_cosine_beside(pixel + vec2<i32>(BESIDE, 0), depth);
+    let vertical = signed_cosine_beside(pixel - vec2<i32>(0, BESIDE), depth)
+        + signed_cosine_beside(pixel + vec2<i32>(0, BESIDE), depth);
+    return own + horizontal + vertical > 0.0;
+}
+
+fn splat_color(pixel: vec2<i32>, id: u32, surface: u32, depth: f32) -> vec3<f32> {
     if !has_normal(surface) {
         let far = (depth - frame.scene_depth.x) / max(frame.scene_depth.y - frame.scene_depth.x, 1e-30);
         return vec3<f32>(mix(0.86, 0.42, clamp(far, 0.0, 1.0)));
     }
-    let turn = is_turned(instance);
     if look.mode == MODE_NORMALS {
         let normal = unpack_normal(surface & NORMAL_BITS);
-        return select(normal, -normal, turn) * 0.5 + 0.5;
+        return select(normal, -normal, is_turned(id - 1u)) * 0.5 + 0.5;
     }
-    let code = surface >> 22u;
-    let cosine = f32(code & 511u) / 511.0;
-    let is_front = (code < 512u) != turn;
-    // Headlight.
-    return select(look.back, look.front, is_front) * mix(0.34, 1.0, cosine);
+    let headlight = mix(0.34, 1.0, f32((surface >> 22u) & 511u) / 511.0);
+    return select(look.back, look.front, is_front(pixel, id, surface, depth)) * headlight;
 }
 
 @fragment
@@ -137,7 +176,7 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
 
     let depth = visual_depth(here.y);
     let dark = crease(depth, left, right) + crease(depth, above, below);
-    var color = splat_color(here.x - 1u, surface, depth_of(here.y)) * exp(-CREASE_STRENGTH * dark);
+    var color = splat_color(pixel, here.x, surface, depth_of(here.y)) * exp(-CREASE_STRENGTH * dark);
 
     if look.n_highlights > 0u && is_highlighted(here.x) {
         color = mix(color, look.highlight, 0.55);

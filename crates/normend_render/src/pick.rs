@@ -14,9 +14,10 @@ use crate::gpu_types::{ID_NONE, ID_SPHERE};
 
 /// Pixels that the window reaches beyond the picked one, on each side.
 const REACH: u32 = 4;
-/// How much deeper than the nearest pixel of the window the picked surface may be, in lengths of a pixel: the whole
-/// window on a surface seen at 45° to the line of sight.
-const SLACK: f32 = 2.0 * REACH as f32;
+/// How deep a surface may fall from one pixel to another, in lengths of a pixel per pixel of their distance (seen at 68°
+/// to the line of sight), and beyond that, for discs that overlap.
+const STEEPEST: f32 = 2.5;
+const STEP: f32 = 2.0;
 /// Bytes of a pixel: id and depth.
 const PIXEL_BYTES: u32 = 8;
 
@@ -71,17 +72,24 @@ impl PictureView {
 
     /// The hit that `window` means: its first pixel is `origin`, its rows have `width` pixels of id and depth bits.
     fn hit(&self, window: &[[u32; 2]], width: u32, origin: UVec2, pixel: UVec2) -> Option<Hit> {
-        let seen = window
+        let seen: Vec<(u32, UVec2, f32)> = window
             .iter()
             .enumerate()
             .filter(|(_, [id, _])| *id != ID_NONE)
             .map(|(i, &[id, bits])| {
                 let at = origin + UVec2::new(i as u32 % width, i as u32 / width);
                 (id, at, self.depth(f32::from_bits(bits)))
-            });
-        let nearest = seen.clone().map(|(.., depth)| depth).min_by(f32::total_cmp)?;
-        let limit = nearest + SLACK * self.camera.pixel_len(nearest, self.size());
-        let (id, at, depth) = seen.filter(|&(.., depth)| depth <= limit).min_by(|a, b| {
+            })
+            .collect();
+        // A pixel is on the nearest surface unless another lies before it by more than one surface could.
+        let is_nearest = |&&(_, at, depth): &&(u32, UVec2, f32)| {
+            let len = self.camera.pixel_len(depth, self.size());
+            seen.iter().all(|&(_, other, nearer)| {
+                let distance = at.as_vec2().distance(other.as_vec2());
+                depth - nearer <= len * (STEEPEST * distance + STEP)
+            })
+        };
+        let &(id, at, depth) = seen.iter().filter(is_nearest).min_by(|a, b| {
             let distance = |at: UVec2| at.as_ivec2().distance_squared(pixel.as_ivec2());
             distance(a.1).cmp(&distance(b.1)).then(a.2.total_cmp(&b.2))
         })?;
@@ -253,7 +261,7 @@ mod tests {
         cells[4] = (9, 50.0);
         check(cells, Some(6));
         // On one surface, the middle wins although a neighbor is a little nearer.
-        cells[4] = (9, 9.0);
+        cells[4] = (9, 7.0);
         check(cells, Some(8));
         cells[4] = (ID_SPHERE | 3, 4.0);
         check(cells, Some(1003));
