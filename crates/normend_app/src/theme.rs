@@ -15,7 +15,7 @@ pub const SPACE_M: f32 = 12.0;
 pub const SPACE_L: f32 = 16.0;
 
 /// Width of the side panel, in points.
-pub const SIDE_PANEL_WIDTH: f32 = 288.0;
+pub const SIDE_PANEL_WIDTH: f32 = 324.0;
 /// Width of the first column of label/value rows, in points.
 pub const LABEL_WIDTH: f32 = 104.0;
 
@@ -97,8 +97,8 @@ pub fn apply(ctx: &egui::Context) {
         style.spacing.window_margin = Margin::same(SPACE_L as i8);
         style.spacing.menu_margin = Margin::same(SPACE_XS as i8);
         style.spacing.interact_size = Vec2::new(40.0, 26.0);
-        style.spacing.combo_width = 132.0;
-        style.spacing.slider_width = 104.0;
+        style.spacing.combo_width = 168.0;
+        style.spacing.slider_width = 100.0;
         style.interaction.selectable_labels = false;
     });
     for theme in [Theme::Dark, Theme::Light] {

@@ -1,8 +1,8 @@
 //! Messages over the view, and the log of all of them.
 
-use egui::{Align2, Area, Button, Id, Label, Order, Rect, RichText, ScrollArea, Ui, Vec2};
+use egui::{Align, Align2, Area, Button, Id, Label, Layout, Order, Rect, RichText, ScrollArea, Ui, Vec2};
 
-use crate::messages::{Level, Messages};
+use crate::messages::{Level, Message, Messages};
 use crate::theme::{self, SPACE_M, SPACE_S};
 
 const WIDTH: f32 = 380.0;
@@ -33,29 +33,26 @@ pub fn toasts(ui: &Ui, view: Rect, messages: &mut Messages) {
                 };
                 theme::card(ui).show(ui, |ui| {
                     ui.set_width(WIDTH);
-                    ui.horizontal_top(|ui| {
-                        let width = WIDTH - 76.0;
-                        ui.allocate_ui(Vec2::new(width, 0.0), |ui| {
-                            ui.set_width(width);
+                    ui.with_layout(Layout::right_to_left(Align::TOP), |ui| {
+                        let close = ui.add(Button::new(RichText::new("Close").weak()).small().frame(false));
+                        if close.on_hover_text("Hide this message; the log keeps it").clicked() {
+                            entry.shown_until = None;
+                        }
+                        ui.with_layout(Layout::top_down(Align::Min), |ui| {
                             let color = match entry.level {
                                 Level::Info => ui.visuals().text_color(),
                                 Level::Error => ui.visuals().error_fg_color,
                             };
-                            let times = if entry.n_times > 1 {
-                                format!(" (×{})", entry.n_times)
-                            } else {
-                                String::new()
-                            };
-                            ui.add(Label::new(RichText::new(format!("{}{times}", entry.text)).color(color)).wrap());
+                            ui.add(Label::new(RichText::new(text(entry)).color(color)).wrap());
                         });
-                        let close = ui.add(Button::new("Close").frame(false));
-                        if close.on_hover_text("Hide this message; the log keeps it").clicked() {
-                            entry.shown_until = None;
-                        }
                     });
                 });
             }
         });
+}
+
+fn text(message: &Message) -> String {
+    if message.n_times > 1 { format!("{} (×{})", message.text, message.n_times) } else { message.text.clone() }
 }
 
 /// The window with all messages of this run.
@@ -83,12 +80,7 @@ pub fn log(ui: &Ui, open: &mut bool, messages: &Messages) {
                                     Level::Error => ("Error", ui.visuals().error_fg_color),
                                 };
                                 ui.label(RichText::new(name).color(color));
-                                let times = if entry.n_times > 1 {
-                                    format!(" (×{})", entry.n_times)
-                                } else {
-                                    String::new()
-                                };
-                                ui.add(Label::new(format!("{}{times}", entry.text)).wrap().selectable(true));
+                                ui.add(Label::new(text(entry)).wrap().selectable(true));
                                 ui.end_row();
                             }
                         });
