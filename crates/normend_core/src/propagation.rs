@@ -193,6 +193,26 @@ impl Propagation {
     }
 }
 
+impl Propagation {
+    /// `n` oriented normals by point as they are before any source: those that a document without sources shows. O(n).
+    pub fn initial_normals(&self) -> Vec<Vec3> {
+        let mut turned = FixedBitSet::with_capacity(self.tree.n_points());
+        let mut normals = vec![Vec3::ZERO; self.tree.n_points()];
+        for (position, &point) in self.tree.order().iter().enumerate() {
+            let is_turned = match self.tree.parent(position as u32) {
+                Some(parent) if !self.initial_cuts.contains(position) => {
+                    turned.contains(parent as usize) ^ self.tree.phi(parent) ^ self.tree.phi(position as u32)
+                }
+                _ => self.initially_turned.contains(position),
+            };
+            turned.set(position, is_turned);
+            let normal = self.normals[point as usize];
+            normals[point as usize] = if is_turned { -normal } else { normal };
+        }
+        normals
+    }
+}
+
 /// Whether the normal at `root` turns so that the default source of its component points up: the point farthest along
 /// +z, of several the one with the smallest id.
 fn turn_upward(cloud: &PointCloud, normals: &[Vec3], tree: &SpanningTree, root: u32) -> bool {

@@ -19,30 +19,6 @@ fn sheets(side: usize, sheets: usize) -> PointCloud {
     PointCloud::new(DVec3::ZERO, positions).unwrap()
 }
 
-/// The oriented normal of each point without any source.
-fn oriented(propagation: &Propagation) -> Vec<Vec3> {
-    let tree = &propagation.tree;
-    let mut turned = FixedBitSet::with_capacity(tree.n_points());
-    for position in 0..tree.n_points() as u32 {
-        let starts = propagation.initial_cuts.contains(position as usize);
-        let value = match tree.parent(position) {
-            Some(parent) if !starts => turned.contains(parent as usize) ^ tree.phi(parent) ^ tree.phi(position),
-            _ => propagation.initially_turned.contains(position as usize),
-        };
-        turned.set(position as usize, value);
-    }
-    (0..tree.n_points() as u32)
-        .map(|point| {
-            let normal = propagation.normals[point as usize];
-            if turned.contains(tree.position(point) as usize) {
-                -normal
-            } else {
-                normal
-            }
-        })
-        .collect()
-}
-
 fn propagate(cloud: &PointCloud, given: Option<&[Vec3]>, start: Start) -> Propagation {
     let parameters = Parameters {
         start,
@@ -56,7 +32,7 @@ fn each_component_starts_upward() {
     let propagation = propagate(&sheets(12, 2), None, Start::Estimate);
     assert_eq!(propagation.tree.roots().len(), 2);
     assert!(propagation.initial_cuts.is_clear());
-    assert!(oriented(&propagation).iter().all(|normal| normal.z > 0.999));
+    assert!(propagation.initial_normals().iter().all(|normal| normal.z > 0.999));
     let stages: Vec<Stage> = propagation.seconds.iter().map(|(stage, _)| *stage).collect();
     assert_eq!(stages, [Stage::Neighbors, Stage::Normals, Stage::Graph, Stage::Tree]);
 }
@@ -72,7 +48,7 @@ fn given_normals_are_kept_bit_by_bit() {
         })
         .collect();
     let propagation = propagate(&cloud, Some(&given), Start::Keep);
-    assert_eq!(oriented(&propagation), given);
+    assert_eq!(propagation.initial_normals(), given);
     assert!(!propagation.initial_cuts.is_clear());
     for position in propagation.initial_cuts.ones() {
         assert!(propagation.tree.parent(position as u32).is_some());
@@ -84,7 +60,12 @@ fn other_lengths_are_normalized() {
     let cloud = sheets(5, 1);
     let given = vec![Vec3::new(0.0, 0.0, -1e-30); 25];
     let propagation = propagate(&cloud, Some(&given), Start::Keep);
-    assert!(oriented(&propagation).iter().all(|&normal| normal == Vec3::NEG_Z));
+    assert!(
+        propagation
+            .initial_normals()
+            .iter()
+            .all(|&normal| normal == Vec3::NEG_Z)
+    );
 }
 
 #[test]
@@ -97,7 +78,7 @@ fn missing_normals_take_the_sign_that_reaches_them() {
     }
     given[7] = Vec3::NAN;
     let propagation = propagate(&cloud, Some(&given), Start::Keep);
-    let oriented = oriented(&propagation);
+    let oriented = propagation.initial_normals();
     assert!(oriented[..400].iter().all(|normal| normal.z < -0.999));
     assert!(oriented[400..].iter().all(|normal| normal.z > 0.999));
     assert!(propagation.initial_cuts.is_clear());
@@ -116,7 +97,7 @@ fn given_signs_that_meet_across_missing_ones_are_cut_apart() {
         given[point] = Vec3::NEG_Z;
     }
     let propagation = propagate(&cloud, Some(&given), Start::Keep);
-    let oriented = oriented(&propagation);
+    let oriented = propagation.initial_normals();
     assert!(up.iter().all(|&point| oriented[point] == Vec3::Z));
     assert!(down.iter().all(|&point| oriented[point] == Vec3::NEG_Z));
     assert!(oriented.iter().all(|normal| normal.z.abs() > 0.999));

@@ -1,0 +1,153 @@
+use super::*;
+use crate::{EdgeRule, Parameters, PointCloud, Propagation, Silent, metrics};
+
+/// The normals that a propagation starts with, before any source.
+fn start(cloud: &PointCloud, parameters: Parameters) -> (Propagation, Vec<Vec3>) {
+    let propagation = Propagation::new(cloud, None, parameters, &Silent).unwrap();
+    let normals = propagation.initial_normals();
+    (propagation, normals)
+}
+
+fn cloud(shape: &Shape) -> PointCloud {
+    PointCloud::new(DVec3::ZERO, shape.positions.clone()).unwrap()
+}
+
+#[test]
+fn every_shape_has_its_points_and_unit_normals() {
+    for kind in ShapeKind::ALL {
+        for n_points in [0, 1, 17, 3000] {
+            let shape = kind.generate(n_points);
+            assert_eq!(
+                (shape.positions.len(), shape.normals.len()),
+                (n_points, n_points),
+                "{}",
+                kind.name()
+            );
+            assert!(shape.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-6));
+            assert!(shape.positions.iter().all(|position| position.is_finite()));
+        }
+    }
+}
+
+/// A closed surface: outward normals have a mean of zero when points are even, and a positive flux.
+#[test]
+fn normals_point_outward() {
+    for kind in ShapeKind::ALL {
+        let shape = kind.generate(20_000);
+        let n_points = shape.positions.len() as f32;
+        let mean = shape.normals.iter().sum::<Vec3>() / n_points;
+        // The bore of the part lacks strips, but opposite ones.
+        assert!(mean.length() < 0.01, "{} {mean}", kind.name());
+        let flux: f32 = shape
+            .positions
+            .iter()
+            .zip(&shape.normals)
+            .map(|(position, normal)| position.dot(*normal))
+            .sum();
+        assert!(flux > 0.0, "{}", kind.name());
+    }
+}
+
+#[test]
+fn points_are_even() {
+    // In random points the nearest pair of 3000 is a hundredth of the mean distance apart.
+    for kind in ShapeKind::ALL {
+        let shape = kind.generate(3000);
+        let neighbors = crate::Neighbors::find(&cloud(&shape), 1, &Silent).unwrap();
+        let distance = |point: usize| shape.positions[point].distance(shape.positions[neighbors.of(point)[0] as usize]);
+        let mut distances: Vec<f32> = (0..3000).map(distance).collect();
+        distances.sort_by(f32::total_cmp);
+        let (near, middle) = (distances[60], distances[1500]);
+        assert!(near > 0.3 * middle, "{} {near} {middle}", kind.name());
+    }
+}
+
+#[test]
+fn noise_moves_points_and_follows_the_seed() {
+    let exact = sphere(2000);
+    let noisy = exact.clone().with_noise(0.01, 7);
+    assert_eq!(noisy, exact.clone().with_noise(0.01, 7));
+    assert_ne!(noisy, exact.clone().with_noise(0.01, 8));
+    assert_eq!(exact, exact.clone().with_noise(0.0, 7));
+    let squares: f32 = noisy
+        .positions
+        .iter()
+        .zip(&exact.positions)
+        .map(|(a, b)| a.distance_squared(*b))
+        .sum::<f32>()
+        / 6000.0;
+    let deviation = squares.sqrt() / 12.0_f32.sqrt();
+    assert!((0.0095..0.0105).contains(&deviation), "{deviation}");
+}
+
+#[test]
+fn closed_shapes_come_out_right() {
+    // A point on an edge can have its exact normal more than a right angle from any normal between the faces.
+    for (kind, noise, most_wrong) in [
+        (ShapeKind::Sphere, 0.003, 0),
+        (ShapeKind::Torus, 0.0, 0),
+        (ShapeKind::Plate, 0.0, 5),
+        (ShapeKind::Fandisk, 0.0006, 10),
+    ] {
+        let shape = kind.generate(10_000).with_noise(noise, 3);
+        let cloud = cloud(&shape);
+        let (_, normals) = start(&cloud, Parameters::default());
+        let comparison = metrics::compare(&cloud, &shape.normals, &normals, &Silent).unwrap();
+        assert!(
+            comparison.n_wrong <= most_wrong,
+            "{}: {}",
+            kind.name(),
+            comparison.n_wrong
+        );
+    }
+}
+
+#[test]
+fn reflection_orients_a_plate_thinner_than_its_spacing() {
+    let shape = thin_plate(8000, 0.015);
+    let cloud = cloud(&shape);
+    let wrong = |edge_rule: EdgeRule| {
+        let parameters = Parameters {
+            edge_rule,
+            ..Parameters::default()
+        };
+        let (_, normals) = start(&cloud, parameters);
+        metrics::compare(&cloud, &shape.normals, &normals, &Silent)
+            .unwrap()
+            .n_wrong_global_flip
+    };
+    let (dot, reflection) = (wrong(EdgeRule::Dot), wrong(EdgeRule::Reflection));
+    assert!(dot > 2000 && reflection < dot / 4, "{dot} {reflection}");
+}
+
+/// The sample has what a new user needs: most is right, one patch in plain sight is wrong, and one click mends it.
+#[test]
+fn the_sample_has_one_wrong_patch() {
+    let shape = sample_part();
+    assert_eq!(shape.positions.len(), 80_000);
+    let cloud = cloud(&shape);
+    let (propagation, normals) = start(&cloud, Parameters::default());
+    let comparison = metrics::compare(&cloud, &shape.normals, &normals, &Silent).unwrap();
+    let share = comparison.n_wrong as f64 / 80_000.0;
+    assert!((0.03..0.15).contains(&share), "{share}");
+    // A click turns a component without sources: the wrong one is wrong as a whole.
+    let mut turned = normals;
+    let tree = &propagation.tree;
+    let wrong_in = |root: u32| {
+        let range = tree.subtree(root);
+        let points = range.clone().map(|position| tree.order()[position as usize] as usize);
+        (
+            points.filter(|&point| comparison.wrong.contains(point)).count(),
+            range.len(),
+        )
+    };
+    let clicked = *tree.roots().iter().max_by_key(|&&root| wrong_in(root).0).unwrap();
+    let (wrong, size) = wrong_in(clicked);
+    assert!(wrong as f64 > 0.99 * size as f64, "{wrong} of {size}");
+    for position in tree.subtree(clicked) {
+        let normal = &mut turned[tree.order()[position as usize] as usize];
+        *normal = -*normal;
+    }
+    let mended = metrics::compare(&cloud, &shape.normals, &turned, &Silent).unwrap();
+    assert!(mended.n_wrong < 80, "{}", mended.n_wrong);
+}
