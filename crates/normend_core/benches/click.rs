@@ -3,17 +3,15 @@
 //! Criterion gives means; the tail is what a user feels, so the percentiles of many single clicks are printed too.
 //! Picks are random, which is harder than a user's: most of them split a large right region somewhere in its middle.
 
+use std::f32::consts::TAU;
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use fixedbitset::FixedBitSet;
 use glam::{DVec3, Vec3};
 use normend_core::sources::Origin;
-use normend_core::{
-    Document, Edit, Parameters, PointCloud, Propagation, RiemannianGraph, Silent, Source, SpanningTree,
-};
+use normend_core::{Document, Edit, Estimator, Parameters, PointCloud, Propagation, Silent, Source};
 
 /// Random numbers: SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators").
 struct Random(u64);
@@ -27,57 +25,52 @@ impl Random {
         bits ^ (bits >> 31)
     }
 
+    /// In 0..1.
+    fn fraction(&mut self) -> f32 {
+        (self.next() >> 40) as f32 / (1_u64 << 24) as f32
+    }
+
     fn below(&mut self, end: usize) -> u32 {
         (self.next() % end as u64) as u32
     }
 }
 
-/// A square sheet of `side × side` points, each joined to its eight neighbors by random weights: rougher than any scan,
-/// with the deep tree of a large one. The parent edge of one position in `cut_every` is an initial cut.
-fn sheet(side: usize, cut_every: usize) -> Document {
-    let n_points = side * side;
+/// A noisy torus scanned at random: `n_points` with noise of half their spacing, and the tree of their normals. Where
+/// `n_points_per_cut` is given, so many points on average have one initial cut, as when given normals are kept.
+fn scan(n_points: usize, n_points_per_cut: Option<usize>) -> Document {
+    const MAJOR: f32 = 1.0;
+    const MINOR: f32 = 0.4;
+    let area = TAU * TAU * MAJOR * MINOR;
+    let noise = 0.5 * (area / n_points as f32).sqrt();
     let mut random = Random(1);
-    let mut edges = Vec::with_capacity(4 * n_points);
-    for row in 0..side {
-        for column in 0..side {
-            for (down, right) in [(0, 1), (1, 0), (1, 1), (1, -1)] {
-                let (other_row, other_column) = (row + down, column.wrapping_add_signed(right));
-                if other_row < side && other_column < side {
-                    let ends = [row * side + column, other_row * side + other_column].map(|end| end as u32);
-                    let bits = random.next();
-                    edges.push((
-                        ends[0],
-                        ends[1],
-                        (bits >> 40) as f32 / (1_u64 << 24) as f32,
-                        bits & 1 == 1,
-                    ));
-                }
-            }
-        }
-    }
-    let Ok(tree) = SpanningTree::new(&RiemannianGraph::from_edges(n_points, &edges), &Silent) else {
-        unreachable!("silent progress never cancels")
-    };
-    let mut initial_cuts = FixedBitSet::with_capacity(n_points);
-    for position in 1..n_points {
-        initial_cuts.set(position, random.below(cut_every) == 0);
-    }
     let positions = (0..n_points)
-        .map(|point| Vec3::new((point % side) as f32, (point / side) as f32, 0.0))
+        .map(|_| {
+            let (around, across) = (TAU * random.fraction(), TAU * random.fraction());
+            let radius = MINOR + noise * (2.0 * random.fraction() - 1.0);
+            let out = MAJOR + radius * across.cos();
+            Vec3::new(out * around.cos(), out * around.sin(), radius * across.sin())
+        })
         .collect();
     let Ok(cloud) = PointCloud::new(DVec3::ZERO, positions) else {
-        unreachable!("the sheet is finite and small")
+        unreachable!("a torus is finite and not small")
     };
+    let parameters = Parameters {
+        estimator: Estimator::Pca,
+        ..Parameters::default()
+    };
+    let Ok(mut propagation) = Propagation::new(&cloud, None, parameters, &Silent) else {
+        unreachable!("silent progress never cancels")
+    };
+    if let Some(n_points_per_cut) = n_points_per_cut {
+        for position in 0..n_points {
+            let is_root = propagation.tree.parent(position as u32).is_none();
+            propagation
+                .initial_cuts
+                .set(position, !is_root && random.below(n_points_per_cut) == 0);
+        }
+    }
     let mut document = Document::new(Arc::new(cloud), None);
-    document.install(Propagation {
-        parameters: Parameters::default(),
-        normals: Arc::new(vec![Vec3::Z; n_points]),
-        splat_radii: Arc::new(vec![1.0; n_points]),
-        tree: Arc::new(tree),
-        initial_cuts,
-        initially_turned: FixedBitSet::with_capacity(n_points),
-        seconds: Vec::new(),
-    });
+    document.install(propagation);
     document
 }
 
@@ -149,9 +142,8 @@ fn time_batch(document: &mut Document, random: &mut Random) {
 
 fn click(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("click");
-    for (side, cut_every) in [(1000, usize::MAX), (1000, 10), (2237, usize::MAX)] {
-        let mut document = sheet(side, cut_every);
-        let n_points = document.cloud().n_points();
+    for (n_points, n_points_per_cut) in [(1_000_000, None), (1_000_000, Some(10)), (5_000_000, None)] {
+        let mut document = scan(n_points, n_points_per_cut);
         let n_cuts = document
             .propagation()
             .map_or(0, |propagation| propagation.initial_cuts.count_ones(..));
