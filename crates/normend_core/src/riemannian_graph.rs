@@ -265,3 +265,116 @@ impl Agreement {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::Silent;
+
+    fn any_vector() -> impl Strategy<Value = Vec3> {
+        (-1.0_f32..1.0, -1.0_f32..1.0, -1.0_f32..1.0).prop_map(Vec3::from)
+    }
+
+    /// Positions with unit normals.
+    fn any_cloud() -> impl Strategy<Value = Vec<(Vec3, Vec3)>> {
+        let normal = any_vector().prop_filter_map("too short", |normal| normal.try_normalize());
+        prop::collection::vec((any_vector(), normal), 2..60)
+    }
+
+    fn graph(points: &[(Vec3, Vec3)], k: usize, rule: EdgeRule) -> (Neighbors, RiemannianGraph) {
+        let (positions, normals): (Vec<Vec3>, Vec<Vec3>) = points.iter().copied().unzip();
+        let cloud = PointCloud::new(DVec3::ZERO, positions).unwrap();
+        let neighbors = Neighbors::find(&cloud, 12, &Silent).unwrap();
+        let graph = RiemannianGraph::new(&cloud, &neighbors, k, &normals, rule, &Silent).unwrap();
+        (neighbors, graph)
+    }
+
+    proptest! {
+        #[test]
+        fn is_the_union_of_the_neighborhoods(points in any_cloud(), k in 1_usize..10) {
+            let (neighbors, graph) = graph(&points, k, EdgeRule::Dot);
+            let mut expect = BTreeMap::new();
+            for point in 0..points.len() {
+                for &neighbor in neighbors.of(point).iter().take(k) {
+                    let ends = (neighbor.min(point as u32), neighbor.max(point as u32));
+                    expect.insert(ends, points[point].1.dot(points[neighbor as usize].1));
+                }
+            }
+            prop_assert_eq!(graph.n_edges(), expect.len());
+            for (a, b, weight, disagree) in graph.edges() {
+                let dot = expect.remove(&(a.min(b), a.max(b)));
+                prop_assert!(dot.is_some());
+                let dot = dot.unwrap();
+                prop_assert!((weight - (1.0 - dot.abs())).abs() < 1e-6);
+                prop_assert!(disagree == (dot < 0.0) || dot.abs() < 1e-6);
+                prop_assert_eq!(graph.edge(a, b), graph.edge(b, a).map(|edge| HalfEdge { neighbor: b, ..edge }));
+            }
+        }
+
+        #[test]
+        fn reflection_mirrors_across_the_edge(points in any_cloud()) {
+            let (_, graph) = graph(&points, 5, EdgeRule::Reflection);
+            for (a, b, weight, disagree) in graph.edges() {
+                let ((p, n), (q, m)) = (points[a as usize], points[b as usize]);
+                let direction = (q - p).normalize_or_zero();
+                let r = n.dot(m) - 2.0 * n.dot(direction) * m.dot(direction);
+                prop_assert!((weight - (1.0 - r.abs())).abs() < 1e-5);
+                prop_assert!(disagree == (r < 0.0) || r.abs() < 1e-5);
+            }
+        }
+
+        #[test]
+        fn an_edge_is_the_same_from_both_ends(a in any_cloud(), b in any_cloud()) {
+            for rule in EdgeRule::ALL {
+                let (there, back) = (Agreement::between(rule, a[0], b[0]), Agreement::between(rule, b[0], a[0]));
+                prop_assert_eq!(there.disagree, back.disagree);
+                prop_assert!((there.weight - back.weight).abs() <= 1e-6 * there.weight);
+            }
+        }
+    }
+
+    #[test]
+    fn nearly_parallel_normals_keep_their_order() {
+        // 1 − |c| rounds to the same f32 for both angles.
+        let at = |angle: f32| (Vec3::X * angle, Vec3::new(angle.sin(), 0.0, angle.cos()));
+        let weight = |angle: f32| Agreement::between(EdgeRule::Dot, at(0.0), at(angle)).weight;
+        assert!(weight(1e-5) < weight(2e-5));
+        assert!((weight(1e-3) / 5e-7 - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn points_in_one_place_compare_by_the_dot_product() {
+        let (a, b) = ((Vec3::ONE, Vec3::Z), (Vec3::ONE, Vec3::NEG_Z));
+        let expect = Agreement {
+            weight: 0.0,
+            disagree: true,
+        };
+        assert_eq!(Agreement::between(EdgeRule::Reflection, a, b), expect);
+        // Across a thin wall the mirror image agrees.
+        let b = (Vec3::new(1.0, 1.0, 0.9), Vec3::NEG_Z);
+        let expect = Agreement {
+            weight: 0.0,
+            disagree: false,
+        };
+        assert_eq!(Agreement::between(EdgeRule::Reflection, a, b), expect);
+    }
+
+    #[test]
+    fn explicit_edges_are_cleaned() {
+        let edges = [
+            (2, 1, 0.5, false),
+            (1, 2, 0.25, true),
+            (1, 2, 0.25, false),
+            (0, 0, 0.0, false),
+            (0, 2, f32::NAN, true),
+            (1, 0, -3.0, false),
+        ];
+        let graph = RiemannianGraph::from_edges(3, &edges);
+        let found: Vec<_> = graph.edges().collect();
+        assert_eq!(found, [(0, 1, 0.0, false), (0, 2, 0.0, true), (1, 2, 0.25, false)]);
+    }
+}

@@ -1,7 +1,7 @@
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::*;
-use crate::Silent;
+use crate::{Silent, metrics, shapes};
 
 /// A flat grid of `side × side` points, and a second one a unit above when `sheets` is 2.
 fn sheets(side: usize, sheets: usize) -> PointCloud {
@@ -192,5 +192,93 @@ fn cancels_in_every_stage() {
     for stop in 0..count.1.into_inner() {
         let result = Propagation::new(&cloud, None, Parameters::default(), &StopAt(stop, AtomicUsize::new(0)));
         assert!(matches!(result, Err(Cancelled)), "report {stop}");
+    }
+}
+
+/// A cloud without ties on which the start is wrong in about half of the points, so that a different tree would show.
+fn hard_cloud() -> Vec<Vec3> {
+    shapes::thin_plate(6000, 0.04).with_noise(0.003, 5).positions
+}
+
+fn start(positions: &[Vec3], estimator: Estimator) -> Vec<Vec3> {
+    let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec()).unwrap();
+    let parameters = Parameters {
+        estimator,
+        ..Parameters::default()
+    };
+    Propagation::new(&cloud, None, parameters, &Silent)
+        .unwrap()
+        .initial_normals()
+}
+
+#[test]
+fn does_not_depend_on_the_order_of_points() {
+    let positions = hard_cloud();
+    // 6007 is prime, so multiples of 1009 visit every id.
+    let ids: Vec<usize> = (1..6007)
+        .map(|i| i * 1009 % 6007)
+        .filter(|&id| id > 0 && id <= 6000)
+        .map(|id| id - 1)
+        .collect();
+    let shuffled: Vec<Vec3> = ids.iter().map(|&id| positions[id]).collect();
+    assert_eq!(shuffled.len(), 6000);
+    for estimator in Estimator::ALL {
+        let (before, after) = (start(&positions, estimator), start(&shuffled, estimator));
+        for (&id, normal) in ids.iter().zip(after) {
+            assert_eq!(normal, before[id], "{} {id}", estimator.name());
+        }
+    }
+}
+
+#[test]
+fn does_not_depend_on_the_unit() {
+    let positions = hard_cloud();
+    for estimator in Estimator::ALL {
+        for factor in [2.0_f32.powi(-30), 2.0_f32.powi(20)] {
+            let scaled: Vec<Vec3> = positions.iter().map(|&position| position * factor).collect();
+            assert_eq!(
+                start(&positions, estimator),
+                start(&scaled, estimator),
+                "{}",
+                estimator.name()
+            );
+        }
+    }
+}
+
+#[test]
+fn does_not_depend_on_the_number_of_threads() {
+    let positions = hard_cloud();
+    for estimator in Estimator::ALL {
+        let with_threads = |n_threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+            pool.install(|| start(&positions, estimator))
+        };
+        assert_eq!(with_threads(1), with_threads(4), "{}", estimator.name());
+    }
+}
+
+#[test]
+fn does_not_depend_on_rotation() {
+    let shape = shapes::fandisk_like(6000).with_noise(0.001, 5);
+    for (axis, angle) in [
+        (DVec3::new(1.0, 2.0, 3.0), 1.0),
+        (DVec3::X, 2.5),
+        (DVec3::new(-1.0, 1.0, 0.1), 4.0),
+    ] {
+        let rotation = DMat3::from_axis_angle(axis.normalize(), angle);
+        let rotate = |vectors: &[Vec3], scale: f64| -> Vec<Vec3> {
+            vectors
+                .iter()
+                .map(|vector| (rotation * vector.as_dvec3() * scale).as_vec3())
+                .collect()
+        };
+        let cloud = PointCloud::new(DVec3::ZERO, rotate(&shape.positions, 3.7)).unwrap();
+        let reference = rotate(&shape.normals, 1.0);
+        for estimator in [Estimator::Pca, Estimator::Obne] {
+            let normals = start(cloud.positions(), estimator);
+            let comparison = metrics::compare(&cloud, &reference, &normals, &Silent).unwrap();
+            assert!(comparison.n_wrong <= 6, "{} {}", estimator.name(), comparison.n_wrong);
+        }
     }
 }
