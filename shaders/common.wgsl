@@ -43,8 +43,8 @@ struct SphereMark {
 struct Seen {
     // Id, and the bits of the clip-space depth.
     @location(0) id_and_depth: vec2<u32>,
-    // Splats: packed normal and its cosine to the eye. Spheres: the place on their disc.
-    @location(1) surface: u32,
+    // Splats: packed normal with its cosine to the eye, and where their center is. Spheres: the place on their disc.
+    @location(1) surface: vec2<u32>,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

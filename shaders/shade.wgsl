@@ -9,9 +9,15 @@ const BESIDE: i32 = 3;
 // How far nearer that surface may be, in lengths of a pixel.
 const BESIDE_DEPTH: f32 = 64.0;
 
+// A surface hides a splat's center when it is nearer by these, in lengths of a pixel: at least and at most, for each
+// pixel between the center and the pixel shaded, and beyond that.
+const HIDDEN_LEAST: f32 = 0.5;
+const HIDDEN_MOST: f32 = 8.0;
+const HIDDEN_STEP: f32 = 1.0;
+
 // Darkness of creases and of what lies behind an edge.
 const CREASE_STRENGTH: f32 = 60.0;
-const CREASE_LIMIT: f32 = 0.008;
+const CREASE_LIMIT: f32 = 0.005;
 
 struct Look {
     front: vec3<f32>,
@@ -72,6 +78,29 @@ fn depth_of(bits: u32) -> f32 {
     return (a.x + a.y * z) / (a.z + a.w * z);
 }
 
+// World length of a pixel at a depth.
+fn pixel_len_at(depth: f32) -> f32 {
+    return frame.pixel_len * select(1.0, depth, frame.perspective > 0.5);
+}
+
+struct Ray {
+    // Relative to the eye.
+    origin: vec3<f32>,
+    // With a depth of 1.
+    direction: vec3<f32>,
+}
+
+// The line of sight through the middle of a pixel.
+fn ray(pixel: vec2<i32>) -> Ray {
+    let from_center = (vec2<f32>(pixel) + 0.5 - 0.5 * frame.size) * frame.pixel_len;
+    let up = cross(frame.back, frame.right);
+    let across = frame.right * from_center.x - up * from_center.y;
+    if frame.perspective > 0.5 {
+        return Ray(vec3<f32>(0.0), across - frame.back);
+    }
+    return Ray(across, -frame.back);
+}
+
 // Depth on a scale on which equal steps look equally deep.
 fn visual_depth(bits: u32) -> f32 {
     let depth = depth_of(bits);
@@ -89,7 +118,7 @@ fn crease(here: f32, a: vec2<u32>, b: vec2<u32>) -> f32 {
 }
 
 fn background(y: f32) -> vec3<f32> {
-    return look.background * mix(1.0, 0.88, y / frame.size.y);
+    return look.background * mix(1.0, 0.92, y / frame.size.y);
 }
 
 fn sphere_color(id: u32, surface: u32) -> vec3<f32> {
@@ -120,20 +149,62 @@ fn signed_cosine_beside(pixel: vec2<i32>, depth: f32) -> f32 {
         return 0.0;
     }
     let nearer = depth - depth_of(there.y);
-    let pixel_len = frame.pixel_len * select(1.0, depth, frame.perspective > 0.5);
     let surface = textureLoad(surfaces, at, 0).x;
-    if nearer <= 0.0 || nearer > BESIDE_DEPTH * pixel_len || !has_normal(surface) {
+    if nearer <= 0.0 || nearer > BESIDE_DEPTH * pixel_len_at(depth) || !has_normal(surface) {
         return 0.0;
     }
     return signed_cosine(there.x, surface);
 }
 
-// Whether the front is seen. Along the outline of a surface, discs just past the horizon stick out and would speckle
-// it with the other side. So a splat that is edge-on takes the side of the surface that curves away from the eye there.
-fn is_front(pixel: vec2<i32>, id: u32, surface: u32, depth: f32) -> bool {
-    let own = signed_cosine(id, surface);
+// From a pixel of a splat to the pixel of its center.
+fn center_offset(surface: vec2<u32>) -> vec2<i32> {
+    let packed = bitcast<i32>(surface.y);
+    return vec2<i32>((packed << 16u) >> 16u, packed >> 16u);
+}
+
+fn is_inside(pixel: vec2<i32>) -> bool {
+    return all(pixel >= vec2<i32>(0)) && all(pixel < vec2<i32>(frame.size));
+}
+
+// The signed cosine of the surface that hides the center of the splat at `pixel`; 0 when nothing does.
+fn side_of_cover(pixel: vec2<i32>, surface: vec2<u32>, depth: f32) -> f32 {
+    let offset = center_offset(surface);
+    let at = pixel + offset;
+    if all(offset == vec2<i32>(0)) || !is_inside(at) {
+        return 0.0;
+    }
+    let there = textureLoad(seen, at, 0).xy;
+    let cover = textureLoad(surfaces, at, 0).xy;
+    if !is_splat(there.x) || !has_normal(cover.x) {
+        return 0.0;
+    }
+    // The depth of the center is where the ray through it meets the plane of the disc.
+    let normal = unpack_normal(surface.x & NORMAL_BITS);
+    let here_ray = ray(pixel);
+    let center_ray = ray(at);
+    let point = here_ray.origin + here_ray.direction * depth;
+    let center_depth = dot(normal, point - center_ray.origin) / dot(normal, center_ray.direction);
+    let nearer = (center_depth - depth_of(there.y)) / pixel_len_at(center_depth);
+    let away = length(vec2<f32>(offset));
+    if nearer < HIDDEN_LEAST * away + HIDDEN_STEP || nearer > HIDDEN_MOST * away + HIDDEN_STEP {
+        return 0.0;
+    }
+    // What itself only sticks out from behind hides nothing.
+    let center_of_cover = at + center_offset(cover);
+    if !is_inside(center_of_cover) || textureLoad(seen, center_of_cover, 0).x != there.x {
+        return 0.0;
+    }
+    return signed_cosine(there.x, cover.x);
+}
+
+// Whether the front is seen. Discs reach beyond the edges of a surface, and there those of the far side stick out and
+// would line it with the other color. So a splat whose center is hidden takes the side of what hides it, and one that
+// is edge-on the side of the surface that curves away from the eye there.
+fn is_front(pixel: vec2<i32>, id: u32, surface: vec2<u32>, depth: f32) -> bool {
+    let own = signed_cosine(id, surface.x);
     if abs(own) >= EDGE_ON {
-        return own > 0.0;
+        let cover = side_of_cover(pixel, surface, depth);
+        return select(own, cover, cover != 0.0) > 0.0;
     }
     let horizontal = signed_cosine_beside(pixel - vec2<i32>(BESIDE, 0), depth)
         + signed_cosine_beside(pixel + vec2<i32>(BESIDE, 0), depth);
@@ -142,16 +213,16 @@ fn is_front(pixel: vec2<i32>, id: u32, surface: u32, depth: f32) -> bool {
     return own + horizontal + vertical > 0.0;
 }
 
-fn splat_color(pixel: vec2<i32>, id: u32, surface: u32, depth: f32) -> vec3<f32> {
-    if !has_normal(surface) {
+fn splat_color(pixel: vec2<i32>, id: u32, surface: vec2<u32>, depth: f32) -> vec3<f32> {
+    if !has_normal(surface.x) {
         let far = (depth - frame.scene_depth.x) / max(frame.scene_depth.y - frame.scene_depth.x, 1e-30);
         return vec3<f32>(mix(0.86, 0.42, clamp(far, 0.0, 1.0)));
     }
     if look.mode == MODE_NORMALS {
-        let normal = unpack_normal(surface & NORMAL_BITS);
+        let normal = unpack_normal(surface.x & NORMAL_BITS);
         return select(normal, -normal, is_turned(id - 1u)) * 0.5 + 0.5;
     }
-    let headlight = mix(0.34, 1.0, f32((surface >> 22u) & 511u) / 511.0);
+    let headlight = mix(0.34, 1.0, f32((surface.x >> 22u) & 511u) / 511.0);
     return select(look.back, look.front, is_front(pixel, id, surface, depth)) * headlight;
 }
 
@@ -162,9 +233,9 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     if here.x == ID_NONE {
         return vec4<f32>(background(position.y), 1.0);
     }
-    let surface = textureLoad(surfaces, pixel, 0).x;
+    let surface = textureLoad(surfaces, pixel, 0).xy;
     if !is_splat(here.x) {
-        return vec4<f32>(sphere_color(here.x, surface), 1.0);
+        return vec4<f32>(sphere_color(here.x, surface.x), 1.0);
     }
 
     let reach = i32(max(round(frame.line_width), 1.0));

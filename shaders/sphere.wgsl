@@ -42,5 +42,5 @@ fn fragment(in: Vertex) -> Seen {
     if dot(in.disc, in.disc) > 1.0 {
         discard;
     }
-    return Seen(vec2<u32>(in.id, bitcast<u32>(in.position.z)), pack2x16snorm(in.disc));
+    return Seen(vec2<u32>(in.id, bitcast<u32>(in.position.z)), vec2<u32>(pack2x16snorm(in.disc), 0u));
 }

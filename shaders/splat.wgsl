@@ -4,6 +4,10 @@
 // so surfaces have no holes from far away and no flicker at grazing angles.
 const MIN_RADIUS: f32 = 0.71;
 
+// How far the rim of a disc lies behind its center in the depth test, in radii. So of discs that overlap in one plane, or
+// nearly, each shows what is closest to its own center, instead of what rounding makes of equal depths.
+const CONE: f32 = 0.1;
+
 struct Chunk {
     first: u32,
     pad_0: u32,
@@ -18,7 +22,17 @@ struct Vertex {
     @builtin(position) position: vec4<f32>,
     @location(0) disc: vec2<f32>,
     @location(1) @interpolate(flat) id: u32,
-    @location(2) @interpolate(flat) surface: u32,
+    @location(2) @interpolate(flat) normal: u32,
+    // Pixel of the disc's center.
+    @location(3) @interpolate(flat) center: vec2<f32>,
+    // How the cone changes the clip-space depth: a quotient (in perspective) and a difference (in parallel views).
+    @location(4) @interpolate(flat) cone: vec2<f32>,
+}
+
+struct Fragment {
+    @location(0) id_and_depth: vec2<u32>,
+    @location(1) surface: vec2<u32>,
+    @builtin(frag_depth) depth: f32,
 }
 
 // The cosine between normal and direction to the eye in 10 bits: sign and magnitude.
@@ -50,7 +64,7 @@ fn vertex(@builtin(vertex_index) vertex_index: u32) -> Vertex {
         normal = unpack_normal(point.packed);
     }
     let cosine = dot(normal, to_eye);
-    out.surface = (point.packed & NORMAL_BITS) | (pack_cosine(cosine) << 22u);
+    out.normal = (point.packed & NORMAL_BITS) | (pack_cosine(cosine) << 22u);
 
     // Axes of the disc's ellipse on the screen: `long` lies across the view, `short` is foreshortened along `across`.
     var long = cross(normal, to_eye);
@@ -67,16 +81,33 @@ fn vertex(@builtin(vertex_index) vertex_index: u32) -> Vertex {
     let grow = max(least - radius * abs(seen), 0.0) * select(-1.0, 1.0, seen >= 0.0);
 
     let corner = triangle_corner(vertex_index % 3u);
-    let offset = long * (max(radius, least) * corner.x) + (short * radius + across * grow) * corner.y;
+    let drawn_radius = max(radius, least);
+    let offset = long * (drawn_radius * corner.x) + (short * radius + across * grow) * corner.y;
     out.position = frame.clip_from_eye * vec4<f32>(center + offset, 1.0);
     out.disc = corner;
+
+    let in_clip = frame.clip_from_eye * vec4<f32>(center, 1.0);
+    out.center = (vec2<f32>(0.5, -0.5) * in_clip.xy / in_clip.w + 0.5) * frame.size;
+    let drop = CONE * drawn_radius;
+    out.cone = select(vec2<f32>(0.0, drop / -frame.depth_from_clip.y), vec2<f32>(drop / depth, 0.0), is_perspective);
     return out;
 }
 
+// A pixel offset in two signed halves.
+fn pack_offset(offset: vec2<f32>) -> u32 {
+    let whole = vec2<i32>(clamp(offset, vec2<f32>(-32768.0), vec2<f32>(32767.0)));
+    return bitcast<u32>((whole.y << 16u) | (whole.x & 0xffff));
+}
+
 @fragment
-fn fragment(in: Vertex) -> Seen {
-    if dot(in.disc, in.disc) > 1.0 {
+fn fragment(in: Vertex) -> Fragment {
+    let r_squared = dot(in.disc, in.disc);
+    if r_squared > 1.0 {
         discard;
     }
-    return Seen(vec2<u32>(in.id, bitcast<u32>(in.position.z)), in.surface);
+    var out: Fragment;
+    out.id_and_depth = vec2<u32>(in.id, bitcast<u32>(in.position.z));
+    out.surface = vec2<u32>(in.normal, pack_offset(floor(in.center) - floor(in.position.xy)));
+    out.depth = in.position.z / (1.0 + in.cone.x * r_squared) - in.cone.y * r_squared;
+    return out;
 }

@@ -9,8 +9,8 @@ use egui_wgpu::wgpu;
 /// Id and clip-space depth of what is seen. Not the depth texture itself and not a float texture: the one cannot be
 /// read on OpenGL, the other cannot be drawn to.
 pub const SEEN_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
-/// Packed normal and cosine of what is seen.
-pub const SURFACE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
+/// Packed normal with its cosine, and the center of what is seen.
+pub const SURFACE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
 /// Reversed depth: near 1, far 0.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Gamma-encoded colors, as egui takes them.
