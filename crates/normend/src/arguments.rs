@@ -1,0 +1,354 @@
+//! What can be typed: the one table of commands and flags, which gives the parser and the help.
+
+use std::path::PathBuf;
+
+use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand};
+use normend_core::shapes::ShapeKind;
+use normend_core::{EdgeRule, Estimator, Parameters, Start};
+use normend_render::{DisplayMode, StandardView};
+
+use crate::commands::render::{PaletteName, PictureSize};
+
+/// Most neighbors that can be asked for: each costs 4 bytes a point, and no surface is flat over a thousand points.
+const MAX_K: u64 = 1000;
+/// Most threads that can be asked for; a mistyped number must not exhaust the system.
+const MAX_THREADS: u64 = 1024;
+/// Most points that can be generated, for the same reason.
+const MAX_POINTS: u64 = 1_000_000_000;
+
+/// Makes the normals of a point cloud point to the right side, and lets you mend where they do not.
+///
+/// Without a command the editor opens.
+#[derive(Debug, Parser)]
+#[command(
+    name = "normend",
+    version,
+    args_conflicts_with_subcommands = true,
+    after_help = "\
+Examples:
+  normend                                       open the editor
+  normend scan.ply                              open a scan in the editor
+  normend orient scan.ply -o oriented.ply       orient without a window
+  normend check oriented.ply --reference truth.ply
+  normend render oriented.ply -o picture.png
+
+Exit codes: 0 done, 1 something failed, 2 wrong use, 130 stopped by Ctrl-C."
+)]
+pub struct Arguments {
+    /// What to do without a window.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+
+    /// Scan to open in the editor: PLY, or XYZ text
+    pub scan: Option<PathBuf>,
+}
+
+/// The commands that run without a window.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Orient the normals of scans and write the same files with nx ny nz
+    Orient(OrientArguments),
+    /// Count the normals that point to the wrong side
+    Check(CheckArguments),
+    /// Draw a scan into a PNG picture
+    Render(RenderArguments),
+    /// Write a generated scan whose normals are known
+    Generate(GenerateArguments),
+}
+
+/// Flags of every command.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct CommonArguments {
+    /// Threads to work with [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=MAX_THREADS))]
+    pub threads: Option<usize>,
+
+    /// No bar and no words, only errors
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// How signs are found.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct PropagationArguments {
+    /// How normals are fitted to neighborhoods
+    #[arg(long, value_name = "NAME", value_parser = one_of(&Estimator::ALL, Estimator::name), default_value = Estimator::default().name())]
+    pub estimator: Estimator,
+
+    /// Neighbors that a normal is fitted to
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(3..=MAX_K), default_value_t = Parameters::default().k_normals)]
+    pub k_normals: usize,
+
+    /// Neighbors of each point in the graph that signs travel along
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=MAX_K), default_value_t = Parameters::default().k_graph)]
+    pub k_graph: usize,
+
+    /// How the normals of neighbors are compared
+    #[arg(long, value_name = "NAME", value_parser = one_of(&EdgeRule::ALL, EdgeRule::name), default_value = EdgeRule::default().name())]
+    pub edge_rule: EdgeRule,
+
+    /// Estimate normals, or keep those of the file with their signs
+    #[arg(long, value_name = "NAME", value_parser = one_of(&Start::ALL, Start::name), default_value = Start::default().name())]
+    pub start: Start,
+}
+
+impl From<PropagationArguments> for Parameters {
+    fn from(typed: PropagationArguments) -> Self {
+        Self {
+            estimator: typed.estimator,
+            k_normals: typed.k_normals,
+            k_graph: typed.k_graph,
+            edge_rule: typed.edge_rule,
+            start: typed.start,
+        }
+    }
+}
+
+/// `normend orient`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The output is the file that came in, points in its order, with unit normals nx ny nz. Several inputs go to a folder \
+under their own names; an input that cannot be read does not stop the others, the exit code is 1 then.
+
+The report (--json) has a line for each input: an object with input, output, points, left_out (rows without finite \
+coordinates), components, sources (places where signs start), parameters, seconds (read, neighbors, normals, graph, \
+tree, signs, write, total) and peak_rss_bytes (of the program so far; null where the system does not tell). A failed \
+input has input and error.
+
+Examples:
+  normend orient scan.ply -o oriented.ply
+  normend orient a.ply b.xyz -o oriented/ --json report.jsonl
+  normend orient scan.ply -o oriented.ply --estimator pca --k-graph 6 --json - | jq .seconds
+  normend orient meshlab.ply -o filled.ply --start keep")]
+pub struct OrientArguments {
+    /// Scans to orient: PLY, or XYZ text
+    #[arg(required = true, value_name = "IN")]
+    pub inputs: Vec<PathBuf>,
+
+    /// File to write; a folder when there are several inputs
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+
+    /// How signs are found.
+    #[command(flatten)]
+    pub propagation: PropagationArguments,
+
+    /// Write a report, a JSON object a line, to FILE or to standard output (-)
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+
+    /// Allow the output to take the place of an input
+    #[arg(long)]
+    pub overwrite: bool,
+
+    /// What every command takes.
+    #[command(flatten)]
+    pub common: CommonArguments,
+}
+
+/// `normend check`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+A normal is wrong when it points away from the reference normal (dot product below 0) or is missing. Points whose \
+reference normal is zero are not judged. Both files hold the same points in the same order. Counted are the normals as \
+they are, after the best flip of the whole cloud, and after the best flip of each component of the graph of 10 nearest \
+neighbors.
+
+Examples:
+  normend check oriented.ply --reference truth.ply
+  normend check oriented.ply --reference truth.ply --json | jq .wrong")]
+pub struct CheckArguments {
+    /// Scan with the normals to check
+    pub result: PathBuf,
+
+    /// The same scan with the right normals
+    #[arg(long, value_name = "TRUTH")]
+    pub reference: PathBuf,
+
+    /// Write one JSON object to standard output
+    #[arg(long)]
+    pub json: bool,
+
+    /// What every command takes.
+    #[command(flatten)]
+    pub common: CommonArguments,
+}
+
+/// `normend render`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Normals of the file are drawn as they are; points without normals get oriented ones first, as `normend orient` gives \
+them. No display is needed, only a graphics driver, which may be software (Mesa's lavapipe).
+
+Examples:
+  normend render oriented.ply -o picture.png
+  normend render oriented.ply -o top.png --size 1920x1080 --view top --palette paper")]
+pub struct RenderArguments {
+    /// Scan to draw: PLY, or XYZ text
+    pub input: PathBuf,
+
+    /// Picture to write (PNG)
+    #[arg(short, long, value_name = "PNG")]
+    pub output: PathBuf,
+
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", default_value_t = PictureSize::default())]
+    pub size: PictureSize,
+
+    /// Coloring of the splats
+    #[arg(long, value_name = "NAME", value_parser = one_of(&DisplayMode::ALL, DisplayMode::name), default_value = DisplayMode::default().name())]
+    pub mode: DisplayMode,
+
+    /// Side to look from
+    #[arg(long, value_name = "NAME", value_parser = one_of(&StandardView::ALL, StandardView::name), default_value = StandardView::Corner.name())]
+    pub view: StandardView,
+
+    /// Colors of front and back
+    #[arg(long, value_name = "NAME", value_parser = one_of(&PaletteName::ALL, PaletteName::name), default_value = PaletteName::default().name())]
+    pub palette: PaletteName,
+
+    /// What every command takes.
+    #[command(flatten)]
+    pub common: CommonArguments,
+}
+
+/// `normend generate`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The scan has positions only; --truth writes the same points with their exact outward normals, to check a result \
+against.
+
+Examples:
+  normend generate torus -o torus.ply --truth torus_truth.ply --points 100000
+  normend orient torus.ply -o oriented.ply
+  normend check oriented.ply --reference torus_truth.ply")]
+pub struct GenerateArguments {
+    /// Which shape
+    #[arg(value_parser = one_of(&ShapeKind::ALL, ShapeKind::name))]
+    pub shape: ShapeKind,
+
+    /// File to write: .ply or .xyz
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+
+    /// File to write the same points to with their exact normals
+    #[arg(long, value_name = "FILE")]
+    pub truth: Option<PathBuf>,
+
+    /// Number of points
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 100_000,
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=MAX_POINTS)
+    )]
+    pub points: usize,
+
+    /// Standard deviation of noise on each axis, as a share of the bounding box's diagonal
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = noise)]
+    pub noise: f32,
+
+    /// Number that the noise follows from
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+
+    /// What every command takes.
+    #[command(flatten)]
+    pub common: CommonArguments,
+}
+
+/// Parses a standard deviation: noise of more than the whole shape has no surface left.
+fn noise(typed: &str) -> Result<f32, String> {
+    let parsed: Option<f32> = typed.parse().ok();
+    parsed
+        .filter(|deviation| (0.0..=1.0).contains(deviation))
+        .ok_or_else(|| "type a number from 0 to 1".to_owned())
+}
+
+/// Parses one of `all` by its name, so that the lists of the crates are the only ones.
+fn one_of<T>(all: &'static [T], name: fn(T) -> &'static str) -> impl TypedValueParser<Value = T>
+where
+    T: Copy + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(all.iter().map(|&value| name(value))).try_map(move |typed| {
+        let found = all.iter().copied().find(|&value| name(value) == typed);
+        found.ok_or("is not one of the names")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_table_of_flags_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn a_file_opens_the_editor_and_a_name_runs_a_command() {
+        let opened = Arguments::try_parse_from(["normend", "scan.ply"]).unwrap();
+        assert!(opened.command.is_none());
+        assert_eq!(opened.scan, Some(PathBuf::from("scan.ply")));
+        let empty = Arguments::try_parse_from(["normend"]).unwrap();
+        assert!(empty.command.is_none() && empty.scan.is_none());
+        let oriented = Arguments::try_parse_from(["normend", "orient", "a.ply", "-o", "b.ply"]).unwrap();
+        assert!(matches!(oriented.command, Some(Command::Orient(_))));
+    }
+
+    #[test]
+    fn every_name_of_the_lists_is_understood() {
+        for estimator in Estimator::ALL {
+            for rule in EdgeRule::ALL {
+                for start in Start::ALL {
+                    let typed = [
+                        "normend",
+                        "orient",
+                        "a.ply",
+                        "-o",
+                        "b.ply",
+                        "--estimator",
+                        estimator.name(),
+                    ];
+                    let typed = typed
+                        .into_iter()
+                        .chain(["--edge-rule", rule.name(), "--start", start.name()]);
+                    let Some(Command::Orient(orient)) = Arguments::try_parse_from(typed).unwrap().command else {
+                        panic!("not parsed as orient");
+                    };
+                    let parameters = Parameters::from(orient.propagation);
+                    assert_eq!(
+                        (parameters.estimator, parameters.edge_rule, parameters.start),
+                        (estimator, rule, start)
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_typed_is_the_default_of_the_core() {
+        let typed = ["normend", "orient", "a.ply", "-o", "b.ply"];
+        let Some(Command::Orient(orient)) = Arguments::try_parse_from(typed).unwrap().command else {
+            panic!("not parsed as orient");
+        };
+        assert_eq!(Parameters::from(orient.propagation), Parameters::default());
+    }
+
+    #[test]
+    fn wrong_values_are_refused() {
+        for wrong in [
+            ["--k-normals", "2"],
+            ["--k-graph", "0"],
+            ["--k-graph", "1001"],
+            ["--threads", "0"],
+            ["--estimator", "ransac"],
+            ["--start", ""],
+        ] {
+            let typed = ["normend", "orient", "a.ply", "-o", "b.ply"].into_iter().chain(wrong);
+            assert!(Arguments::try_parse_from(typed).is_err(), "{wrong:?} was accepted");
+        }
+    }
+}

@@ -1,0 +1,289 @@
+//! `normend orient`: scans in, the same scans with oriented normals out.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Context;
+use normend_core::progress::Part;
+use normend_core::{Document, EditError, Parameters, Progress, Propagation, Start};
+use normend_io::WriteOptions;
+use serde::{Serialize, Serializer};
+
+use super::{Outcome, is_same_file, prepare, title_of, wrong_use};
+use crate::arguments::OrientArguments;
+use crate::console::{self, Bar, thousands};
+use crate::memory::peak_rss_bytes;
+
+/// What was typed, understood and found possible.
+#[derive(Debug, PartialEq, Eq)]
+struct Plan {
+    /// The folder that the outputs go to, unless one file was named.
+    folder: Option<PathBuf>,
+    jobs: Vec<Job>,
+}
+
+/// One file to orient.
+#[derive(Debug, PartialEq, Eq)]
+struct Job {
+    input: PathBuf,
+    output: PathBuf,
+}
+
+/// What is reported of one input.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum Report<'a> {
+    Done(Box<Oriented>),
+    Failed { input: &'a Path, error: String },
+}
+
+/// What is reported of an input that was oriented.
+#[derive(Debug, Serialize)]
+struct Oriented {
+    input: PathBuf,
+    output: PathBuf,
+    points: usize,
+    left_out: usize,
+    components: usize,
+    sources: usize,
+    #[serde(serialize_with = "serialize_parameters")]
+    parameters: Parameters,
+    seconds: Seconds,
+    peak_rss_bytes: Option<u64>,
+}
+
+/// Wall seconds by stage, in the order of work.
+#[derive(Debug, Default)]
+struct Seconds(Vec<(&'static str, f64)>);
+
+impl Serialize for Seconds {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().copied())
+    }
+}
+
+fn serialize_parameters<S: Serializer>(parameters: &Parameters, serializer: S) -> Result<S::Ok, S::Error> {
+    /// The parameters under the names of their flags.
+    #[derive(Serialize)]
+    struct Named {
+        estimator: &'static str,
+        k_normals: usize,
+        k_graph: usize,
+        edge_rule: &'static str,
+        start: &'static str,
+    }
+    let named = Named {
+        estimator: parameters.estimator.name(),
+        k_normals: parameters.k_normals,
+        k_graph: parameters.k_graph,
+        edge_rule: parameters.edge_rule.name(),
+        start: parameters.start.name(),
+    };
+    named.serialize(serializer)
+}
+
+/// Orients every input; one that fails does not stop the rest.
+///
+/// # Errors
+/// Wrong use, a report that cannot be written, Ctrl-C. What is wrong with one input is said and reported instead.
+pub fn run(arguments: OrientArguments) -> anyhow::Result<Outcome> {
+    let Plan { folder, jobs } = plan(&arguments)?;
+    prepare(&arguments.common)?;
+    if let Some(folder) = &folder {
+        fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    }
+    let mut report = arguments.json.as_deref().map(open_report).transpose()?;
+    let parameters = Parameters::from(arguments.propagation);
+    let mut outcome = Outcome::Done;
+    for job in &jobs {
+        let bar = Bar::new(&title_of(&job.input), arguments.common.quiet);
+        let line = match orient(job, parameters, arguments.overwrite, &bar) {
+            Ok(oriented) => {
+                bar.say(&sentence(&oriented));
+                Report::Done(Box::new(oriented))
+            }
+            Err(error) if console::is_stopped() => return Err(error),
+            Err(error) => {
+                outcome = Outcome::Failed;
+                let error = format!("{error:#}");
+                bar.say_error(&format!("error: {error}"));
+                Report::Failed {
+                    input: &job.input,
+                    error,
+                }
+            }
+        };
+        if let Some(report) = &mut report {
+            let mut line = serde_json::to_vec(&line).context("cannot put the report into JSON")?;
+            line.push(b'\n');
+            report
+                .write_all(&line)
+                .and_then(|()| report.flush())
+                .context("cannot write the report")?;
+        }
+    }
+    Ok(outcome)
+}
+
+/// Where each input goes, with everything refused that would lose a file.
+///
+/// # Errors
+/// Wrong use, in words.
+fn plan(arguments: &OrientArguments) -> anyhow::Result<Plan> {
+    let output = &arguments.output;
+    let is_folder = arguments.inputs.len() > 1 || output.is_dir() || ends_with_separator(output);
+    if is_folder && output.exists() && !output.is_dir() {
+        return Err(wrong_use(format!(
+            "{} is a file, but several inputs need a folder: give -o the name of a folder",
+            output.display()
+        )));
+    }
+    let mut outputs = BTreeSet::new();
+    let mut jobs = Vec::with_capacity(arguments.inputs.len());
+    for input in &arguments.inputs {
+        let output = if is_folder {
+            let name = input
+                .file_name()
+                .ok_or_else(|| wrong_use(format!("{} is not a file", input.display())))?;
+            output.join(name)
+        } else {
+            output.clone()
+        };
+        if !outputs.insert(output.clone()) {
+            return Err(wrong_use(format!(
+                "two inputs would both be written to {}: rename one, or orient them one by one",
+                output.display()
+            )));
+        }
+        jobs.push(Job {
+            input: input.clone(),
+            output,
+        });
+    }
+    for job in &jobs {
+        let is_input = |path: &Path| jobs.iter().any(|other| is_same_file(&other.input, path));
+        if !arguments.overwrite && is_input(&job.output) {
+            return Err(wrong_use(format!(
+                "{} is an input: name another output, or allow it with --overwrite",
+                job.output.display()
+            )));
+        }
+        if arguments
+            .json
+            .as_deref()
+            .is_some_and(|report| is_input(report) || report == job.output)
+        {
+            return Err(wrong_use(
+                "the report of --json would take the place of a scan: give it another name",
+            ));
+        }
+    }
+    Ok(Plan {
+        folder: is_folder.then(|| output.clone()),
+        jobs,
+    })
+}
+
+fn ends_with_separator(path: &Path) -> bool {
+    path.as_os_str()
+        .as_encoded_bytes()
+        .last()
+        .is_some_and(|&last| std::path::is_separator(char::from(last)))
+}
+
+/// Standard output for `-`, else a new file; opened before the work, so that a wrong path costs no time.
+fn open_report(path: &Path) -> anyhow::Result<Box<dyn Write>> {
+    if path == Path::new("-") {
+        return Ok(Box::new(io::stdout()));
+    }
+    let file = File::create(path).with_context(|| format!("cannot write the report {}", path.display()))?;
+    Ok(Box::new(file))
+}
+
+/// Reads, orients and writes one scan.
+fn orient(job: &Job, parameters: Parameters, overwrite: bool, bar: &Bar) -> anyhow::Result<Oriented> {
+    let started = Instant::now();
+    let mut seconds = Seconds::default();
+
+    let scan = normend_io::read(&job.input, &Part::new(bar, 0.0..0.1))?;
+    seconds.0.push(("read", started.elapsed().as_secs_f64()));
+    let points = scan.cloud.n_points();
+    if parameters.start == Start::Keep && scan.given_normals.is_none() {
+        bar.say(&format!(
+            "{} has no normals to keep: they are estimated",
+            job.input.display()
+        ));
+    }
+
+    let given = scan.given_normals.as_ref().map(|normals| normals.as_slice());
+    let propagation = Propagation::new(&scan.cloud, given, parameters, &Part::new(bar, 0.1..0.9))?;
+    seconds
+        .0
+        .extend(propagation.seconds.iter().map(|&(stage, secs)| (stage.name(), secs)));
+    let components = propagation.tree.roots().len();
+    let sources = components + propagation.initial_cuts.count_ones(..);
+
+    let signs_started = Instant::now();
+    let rule = rule_of(parameters.start, scan.given_normals.is_some());
+    let mut document = Document::new(scan.cloud.clone(), scan.given_normals.clone());
+    document.install(propagation);
+    let normals = document.oriented_normals().ok_or(EditError::NotReady)?;
+    drop(document);
+    seconds.0.push(("signs", signs_started.elapsed().as_secs_f64()));
+
+    let write_started = Instant::now();
+    let options = WriteOptions {
+        rule: rule.to_owned(),
+        overwrite_input: overwrite,
+    };
+    let writing = Part::new(bar, 0.9..1.0);
+    writing.report(0.0)?;
+    scan.write(&normals, &job.output, &options, &writing)?;
+    seconds.0.push(("write", write_started.elapsed().as_secs_f64()));
+    seconds.0.push(("total", started.elapsed().as_secs_f64()));
+
+    Ok(Oriented {
+        input: job.input.clone(),
+        output: job.output.clone(),
+        points,
+        left_out: scan.n_left_out,
+        components,
+        sources,
+        parameters,
+        seconds,
+        peak_rss_bytes: peak_rss_bytes(),
+    })
+}
+
+/// The rule that decided the sides, for the file's comment.
+fn rule_of(start: Start, has_given_normals: bool) -> &'static str {
+    match start {
+        Start::Keep if has_given_normals => "as given",
+        Start::Keep | Start::Estimate => "farthest along +z up",
+    }
+}
+
+/// One line for a person: what came out, and where it is.
+fn sentence(oriented: &Oriented) -> String {
+    let total = oriented.seconds.0.last().map_or(0.0, |&(_, secs)| secs);
+    let left_out = match oriented.left_out {
+        0 => String::new(),
+        1 => " (1 row without finite coordinates left out)".to_owned(),
+        n => format!(" ({} rows without finite coordinates left out)", thousands(n as u64)),
+    };
+    format!(
+        "{}: {} points{left_out}, {} {}, {total:.1} s → {}",
+        oriented.input.display(),
+        thousands(oriented.points as u64),
+        thousands(oriented.components as u64),
+        if oriented.components == 1 {
+            "component"
+        } else {
+            "components"
+        },
+        oriented.output.display()
+    )
+}

@@ -1,0 +1,217 @@
+//! `normend render`: a picture of a scan, without a window.
+
+use std::fmt;
+use std::io::Cursor;
+use std::str::FromStr;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use anyhow::{Context, bail};
+use image::{ExtendedColorType, ImageFormat};
+use normend_core::progress::Part;
+use normend_core::{Document, EditError, Parameters, Progress, Propagation, Start};
+use normend_render::{Camera, DrawSettings, HeadlessDevice, Palette, SplatRenderer};
+
+use super::{Outcome, is_same_file, prepare, title_of, wrong_use};
+use crate::arguments::RenderArguments;
+use crate::console::Bar;
+
+/// Largest side of a picture in pixels: what every graphics adapter can draw to at once (WebGPU's default limit).
+const MAX_SIDE: u32 = 8192;
+
+/// Width and height of a picture in pixels, typed as `1280x800`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PictureSize {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+}
+
+impl Default for PictureSize {
+    fn default() -> Self {
+        Self {
+            width: 1280,
+            height: 800,
+        }
+    }
+}
+
+impl fmt::Display for PictureSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}x{}", self.width, self.height)
+    }
+}
+
+impl FromStr for PictureSize {
+    type Err = String;
+
+    fn from_str(typed: &str) -> Result<Self, String> {
+        let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIDE).contains(side));
+        typed
+            .split_once(['x', 'X'])
+            .and_then(|(width, height)| {
+                Some(Self {
+                    width: side(width)?,
+                    height: side(height)?,
+                })
+            })
+            .ok_or_else(|| format!("type width and height as 1280x800, each 1 to {MAX_SIDE}"))
+    }
+}
+
+/// The palettes by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PaletteName {
+    /// Front blue, back orange.
+    #[default]
+    BlueOrange,
+    /// Front light gray, back black, as printed in papers.
+    Paper,
+}
+
+impl PaletteName {
+    /// All palettes, in the order of the help.
+    pub const ALL: [Self; 2] = [Self::BlueOrange, Self::Paper];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::BlueOrange => "blue-orange",
+            Self::Paper => "paper",
+        }
+    }
+
+    fn palette(self) -> Palette {
+        match self {
+            Self::BlueOrange => Palette::BLUE_ORANGE,
+            Self::Paper => Palette::PAPER,
+        }
+    }
+}
+
+/// Draws one scan into a PNG file.
+///
+/// # Errors
+/// Wrong use, a scan that cannot be read, no graphics driver, a picture that cannot be written; Ctrl-C.
+pub fn run(arguments: &RenderArguments) -> anyhow::Result<Outcome> {
+    if is_same_file(&arguments.input, &arguments.output) {
+        return Err(wrong_use(
+            "the picture would take the place of the scan: name another output",
+        ));
+    }
+    if !arguments
+        .output
+        .extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
+    {
+        return Err(wrong_use(
+            "pictures are PNG files: let the name of the output end with .png",
+        ));
+    }
+    prepare(&arguments.common)?;
+    // Before the work, so that a missing driver costs no time.
+    let graphics = Graphics::open()?;
+    let bar = Bar::new(&title_of(&arguments.input), arguments.common.quiet);
+    let document = read_oriented(arguments, &bar)?;
+    bar.stage("Drawing");
+    let (size, rgba) = graphics.draw(&document, arguments)?;
+    let mut png = Cursor::new(Vec::new());
+    image::write_buffer_with_format(
+        &mut png,
+        &rgba,
+        size[0],
+        size[1],
+        ExtendedColorType::Rgba8,
+        ImageFormat::Png,
+    )
+    .context("cannot make a PNG of the picture")?;
+    normend_io::write_bytes(&arguments.output, png.get_ref())?;
+    bar.say(&format!(
+        "{}: {}x{} pixels",
+        arguments.output.display(),
+        size[0],
+        size[1]
+    ));
+    Ok(Outcome::Done)
+}
+
+/// The scan with the normals of its file; points without one get an oriented normal.
+fn read_oriented(arguments: &RenderArguments, bar: &Bar) -> anyhow::Result<Document> {
+    let scan = normend_io::read(&arguments.input, &Part::new(bar, 0.0..0.1))?;
+    let given = scan.given_normals.as_ref().map(|normals| normals.as_slice());
+    let parameters = Parameters {
+        start: Start::Keep,
+        ..Parameters::default()
+    };
+    let propagation = Propagation::new(&scan.cloud, given, parameters, &Part::new(bar, 0.1..0.9))?;
+    let mut document = Document::new(scan.cloud, scan.given_normals);
+    document.install(propagation);
+    Ok(document)
+}
+
+/// A graphics device without a window, and the first thing that went wrong on it.
+struct Graphics {
+    headless: HeadlessDevice,
+    failure: Arc<Mutex<Option<String>>>,
+}
+
+impl Graphics {
+    fn open() -> anyhow::Result<Self> {
+        let headless = HeadlessDevice::new()?;
+        let failure = Arc::new(Mutex::new(None));
+        let kept = Arc::clone(&failure);
+        // Without a handler wgpu panics.
+        headless.device.on_uncaptured_error(Arc::new(move |error| {
+            kept.lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .get_or_insert_with(|| error.to_string());
+        }));
+        Ok(Self { headless, failure })
+    }
+
+    /// Width and height, and rows of RGBA from the top.
+    fn draw(&self, document: &Document, arguments: &RenderArguments) -> anyhow::Result<([u32; 2], Vec<u8>)> {
+        let HeadlessDevice { device, queue, .. } = &self.headless;
+        let PictureSize { width, height } = arguments.size;
+        let cloud = document.cloud();
+        let normals = document.oriented_normals().ok_or(EditError::NotReady)?;
+        let radii = document
+            .propagation()
+            .map(|propagation| &propagation.splat_radii)
+            .ok_or(EditError::NotReady)?;
+        let (min, max) = cloud.bounding_box();
+        let camera = Camera::framing(min, max, arguments.view, width as f32 / height as f32);
+        let settings = DrawSettings {
+            mode: arguments.mode,
+            palette: arguments.palette.palette(),
+            ..DrawSettings::default()
+        };
+        let mut renderer = SplatRenderer::new(device);
+        renderer.set_cloud(device, queue, cloud.positions(), Some(&normals), radii, None)?;
+        renderer.draw(device, queue, &camera, [width, height], 1.0, &settings);
+        let picture = renderer.read_picture(device, queue);
+        if let Some(failure) = self.failure.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            bail!("the graphics driver cannot draw this ({failure}): try a smaller --size");
+        }
+        picture.context("the graphics driver gave no picture back")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_width_x_height() {
+        fn check(typed: &str, expect: Option<(u32, u32)>) {
+            let size = typed.parse::<PictureSize>().ok();
+            assert_eq!(size.map(|size| (size.width, size.height)), expect, "{typed:?}");
+        }
+        check("1280x800", Some((1280, 800)));
+        check("1X8192", Some((1, 8192)));
+        check(&PictureSize::default().to_string(), Some((1280, 800)));
+        for wrong in ["", "x", "1280", "0x800", "1280x8193", "-1x2", "1280x800x3", "12 x 8"] {
+            check(wrong, None);
+        }
+    }
+}
