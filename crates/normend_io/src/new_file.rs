@@ -8,7 +8,7 @@ use crate::error::WriteError;
 use crate::ply;
 use crate::rewrite::{NO_NORMAL, RowNormals, push_normal};
 use crate::table::{PART_ROWS, for_each_part};
-use crate::value::{Scalar, push_number};
+use crate::value::{Scalar, ValueType, push_number};
 
 /// Points to be written, in order.
 pub(crate) struct NewFile<'a> {
@@ -38,7 +38,7 @@ impl NewFile<'_> {
                     }
                 }
                 for component in normal.iter().flat_map(Vec3::to_array) {
-                    out.extend_from_slice(&component.to_le_bytes());
+                    ValueType::LittleEndian(Scalar::Float).write(component, out);
                 }
             },
             write,
@@ -79,7 +79,7 @@ impl NewFile<'_> {
     ) -> Result<(), WriteError> {
         let make = |index: usize, out: &mut Vec<u8>| -> Result<(), WriteError> {
             let rows = index * PART_ROWS..((index + 1) * PART_ROWS).min(self.n_points);
-            let mut normals = self.normals.map(|normals| normals.from_row(rows.start));
+            let mut normals = self.normals.map(|normals| normals.since_row(rows.start));
             for row in rows {
                 let normal = normals
                     .as_mut()

@@ -24,7 +24,7 @@ impl<'a> RowNormals<'a> {
     }
 
     /// The normals of the rows from `first_row` on, without end; `None` for a row that is no point.
-    pub fn from_row(self, first_row: usize) -> impl Iterator<Item = Option<Vec3>> + 'a {
+    pub fn since_row(self, first_row: usize) -> impl Iterator<Item = Option<Vec3>> + 'a {
         let mut point = self.rows.map_or(first_row, |rows| {
             rows.partition_point(|row| (*row as usize) < first_row)
         });
@@ -77,7 +77,7 @@ fn rewrite_part(
     let table = layout.table();
     let mut rows = layout.rows(bytes, part.bytes.start);
     let mut done = part.bytes.start;
-    for normal in normals.from_row(part.first_row).take(part.n_rows) {
+    for normal in normals.since_row(part.first_row).take(part.n_rows) {
         let Some(spans) = rows.next_row()? else {
             break;
         };
@@ -190,7 +190,7 @@ pub(crate) fn write_text(
     let make = |index: usize, out: &mut Vec<u8>| -> Result<(), WriteError> {
         let part = table.part(index);
         let mut rows = layout.rows(bytes, part.bytes.start);
-        for normal in normals.from_row(part.first_row).take(part.n_rows) {
+        for normal in normals.since_row(part.first_row).take(part.n_rows) {
             let Some(spans) = rows.next_row().map_err(Stop::from)? else {
                 break;
             };

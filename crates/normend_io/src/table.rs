@@ -20,6 +20,20 @@ pub(crate) fn is_space(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | b'\n' | b'\r' | 0x0b | 0x0c)
 }
 
+/// The next run of bytes that are no spaces, from byte `at` on.
+#[inline]
+pub(crate) fn next_token(bytes: &[u8], at: usize) -> Option<Span> {
+    let start = at + bytes[at..].iter().position(|byte| !is_space(*byte))?;
+    let length = bytes[start..]
+        .iter()
+        .position(|byte| is_space(*byte))
+        .unwrap_or(bytes.len() - start);
+    Some(Span {
+        start,
+        end: start + length,
+    })
+}
+
 /// Most points that have ids.
 pub(crate) const MOST_ROWS: usize = u32::MAX as usize - 1;
 

@@ -64,8 +64,9 @@ impl ValueType {
     }
 
     /// Appends `value`: the shortest text that reads back as the same `f32`, a `double`, or a `float`, also in place of
-    /// an integer, which holds no component of a unit vector.
+    /// an integer, which holds no component of a unit vector. Zero is written without a sign.
     pub fn write(self, value: f32, out: &mut Vec<u8>) {
+        let value = value + 0.0;
         match self {
             Self::Text => push_number(f64::from(value), true, out),
             Self::LittleEndian(Scalar::Double) => out.extend_from_slice(&f64::from(value).to_le_bytes()),
@@ -75,10 +76,12 @@ impl ValueType {
         }
     }
 
-    /// Appends `bytes`, a number of this type (text, `float` or `double`), with the opposite sign and nothing else changed.
+    /// Appends `bytes`, a number of this type (text, `float` or `double`), with the opposite sign and nothing else
+    /// changed; zero stays.
     pub fn write_negated(self, bytes: &[u8], out: &mut Vec<u8>) {
         let start = out.len();
         match self {
+            _ if self.read(bytes) == Some(0.0) => out.extend_from_slice(bytes),
             Self::Text => match bytes {
                 [b'-', digits @ ..] => out.extend_from_slice(digits),
                 [b'+', digits @ ..] | digits => {
@@ -195,7 +198,8 @@ mod tests {
         check("0.50", "-0.50");
         check("-0.50", "0.50");
         check("+0.50", "-0.50");
-        for value in [0.5_f64, -3.25, 0.0] {
+        check("0.0", "0.0");
+        for value in [0.5_f64, -3.25] {
             for (value_type, bytes, expect) in [
                 (
                     ValueType::LittleEndian(Scalar::Double),

@@ -9,7 +9,7 @@ use ply_rs::parser::Parser;
 use ply_rs::ply::{DefaultElement, Encoding, PropertyType, ScalarType};
 
 use crate::error::{Broken, Place, quoted};
-use crate::table::Span;
+use crate::table::{Span, next_token};
 use crate::value::{Scalar, ValueType};
 
 /// What begins the comment that Normend leaves in the files it writes.
@@ -344,20 +344,11 @@ fn why_not(bytes: &[u8], declaration: &Declaration) -> Broken {
     Broken::new(Place::Line(declaration.line.number), reason)
 }
 
-/// The words of a line, separated by spaces and tabs.
+/// The words of a line.
 fn words(bytes: &[u8], line: Span) -> Vec<Span> {
-    let mut words = Vec::new();
-    let mut start = None;
-    for at in line.start..=line.end {
-        let is_space = at == line.end || bytes[at].is_ascii_whitespace();
-        match (start, is_space) {
-            (None, false) => start = Some(at),
-            (Some(first), true) => {
-                words.push(Span { start: first, end: at });
-                start = None;
-            }
-            _ => {}
-        }
+    let mut words: Vec<Span> = Vec::new();
+    while let Some(word) = next_token(&bytes[..line.end], words.last().map_or(line.start, |last| last.end)) {
+        words.push(word);
     }
     words
 }

@@ -46,7 +46,6 @@ pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<PlyLayout, S
         at = skip_element(bytes, &header, element, at, progress)?;
     }
     let element = &header.elements[vertex];
-    rows::check_room(bytes, &header, element, at)?;
     let scalar = |slot: usize| match element.properties[slots.properties[slot]].kind {
         Kind::Scalar(scalar) => scalar,
         Kind::List { item, .. } => item,
@@ -67,6 +66,8 @@ pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<PlyLayout, S
         header,
     };
     let element = &layout.header.elements[vertex];
+    let room = rows::check_room(bytes, &layout.header, element, at);
+    room.map_err(|broken| layout.clearer(bytes, at, broken.into()))?;
     let (starts, end) = match (layout.header.encoding, element.stride()) {
         (Encoding::BinaryLittleEndian | Encoding::BinaryBigEndian, Some(stride)) => {
             (Starts::Stride { first: at, stride }, at + element.count * stride)

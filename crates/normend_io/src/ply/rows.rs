@@ -6,7 +6,7 @@ use ply_rs::ply::Encoding;
 use super::Slots;
 use super::header::{Element, Header, Kind};
 use crate::error::{Broken, Place, Stop, quoted};
-use crate::table::{Rows, Span, Spans, is_space};
+use crate::table::{Rows, Span, Spans, next_token};
 use crate::value::parse;
 
 /// Rows between two reports of progress.
@@ -175,20 +175,6 @@ fn text_span(
             ),
         )),
     }
-}
-
-/// The next run of bytes that are no spaces, from byte `at` on.
-#[inline]
-fn next_token(bytes: &[u8], at: usize) -> Option<Span> {
-    let start = at + bytes[at..].iter().position(|byte| !is_space(*byte))?;
-    let length = bytes[start..]
-        .iter()
-        .position(|byte| is_space(*byte))
-        .unwrap_or(bytes.len() - start);
-    Some(Span {
-        start,
-        end: start + length,
-    })
 }
 
 /// Which of the six values each property is, if any.
