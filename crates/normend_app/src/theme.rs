@@ -205,7 +205,7 @@ pub fn rows<R>(ui: &mut Ui, id: &str, add_rows: impl FnOnce(&mut Ui) -> R) -> R 
     egui::Grid::new(id)
         .num_columns(2)
         .min_col_width(LABEL_WIDTH)
-        .spacing([SPACE_S, SPACE_S])
+        .spacing([SPACE_S, SPACE_XS])
         .show(ui, add_rows)
         .inner
 }

