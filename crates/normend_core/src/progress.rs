@@ -54,7 +54,7 @@ impl Progress for Part<'_> {
     }
 }
 
-/// Counts finished steps from many threads and reports the fraction.
+/// Counts finished steps from many threads and reports the fraction, a few hundred times in all.
 pub(crate) struct Steps<'a> {
     progress: &'a dyn Progress,
     done: AtomicUsize,
@@ -76,7 +76,56 @@ impl<'a> Steps<'a> {
     /// # Errors
     /// [`Cancelled`] when the work should stop.
     pub fn advance(&self, count: usize) -> Result<(), Cancelled> {
-        let done = self.done.fetch_add(count, Ordering::Relaxed) + count;
+        let before = self.done.fetch_add(count, Ordering::Relaxed);
+        let done = before + count;
+        let report = |done: usize| done * REPORTS / self.total;
+        if report(done) == report(before) {
+            return Ok(());
+        }
         self.progress.report(done as f32 / self.total as f32)
+    }
+}
+
+/// How often [`Steps`] reports at most.
+const REPORTS: usize = 256;
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+
+    /// Notes every report.
+    #[derive(Default)]
+    struct Notes(Mutex<Vec<f32>>);
+
+    impl Progress for Notes {
+        fn report(&self, fraction: f32) -> Result<(), Cancelled> {
+            let mut notes = self.0.lock().unwrap();
+            notes.push(fraction);
+            if fraction > 0.8 { Err(Cancelled) } else { Ok(()) }
+        }
+    }
+
+    #[test]
+    fn a_part_covers_its_range() {
+        let notes = Notes::default();
+        let half = Part::new(&notes, 0.25..0.75);
+        let inner = Part::new(&half, 0.5..1.0);
+        for fraction in [0.0, 1.0, 7.0] {
+            inner.report(fraction).unwrap();
+        }
+        assert_eq!(*notes.0.lock().unwrap(), [0.5, 0.75, 0.75]);
+    }
+
+    #[test]
+    fn steps_report_some_hundred_times_and_cancel() {
+        let notes = Notes::default();
+        let steps = Steps::new(&notes, 1_000_000);
+        let n_done = (0..1_000_000).take_while(|_| steps.advance(1).is_ok()).count();
+        assert!((800_000..810_000).contains(&n_done), "{n_done}");
+        let notes = notes.0.lock().unwrap();
+        assert!((200..=256).contains(&notes.len()), "{}", notes.len());
+        assert!(notes.is_sorted());
     }
 }

@@ -124,6 +124,9 @@ pub struct Propagation {
     /// For each initial region (roots and initial cuts), by the position of its top: whether the stored normal *there*
     /// starts turned. With [`Start::Estimate`]: so that the component's default source points up.
     pub initially_turned: FixedBitSet,
+    /// The point of each component's default source, in the order of the tree's roots: the one farthest along +z. Empty
+    /// where signs start as given: there each region has the signs that came with it.
+    pub default_sources: Vec<u32>,
     /// Wall seconds of each stage.
     pub seconds: Vec<(Stage, f64)>,
 }
@@ -172,12 +175,15 @@ impl Propagation {
         let tree = SpanningTree::new(&graph, &Part::new(progress, 0.8..1.0))?;
         drop(graph);
         let mut initially_turned = FixedBitSet::with_capacity(tree.n_points());
-        for &root in tree.roots() {
-            initially_turned.set(root as usize, turn_upward(cloud, &normals, &tree, root));
+        let mut default_sources: Vec<u32> = tree.roots().iter().map(|&root| highest(cloud, &tree, root)).collect();
+        for (&root, &source) in tree.roots().iter().zip(&default_sources) {
+            let turned = points_down(normals[source as usize]) ^ tree.phi(tree.position(source));
+            initially_turned.set(root as usize, turned);
         }
         let mut initial_cuts = FixedBitSet::with_capacity(tree.n_points());
         if let Some(given) = &given {
             given.cut_disagreements(&tree, &mut initial_cuts, &mut initially_turned);
+            default_sources.clear();
         }
         clock.finish(Stage::Tree);
 
@@ -188,6 +194,7 @@ impl Propagation {
             tree: Arc::new(tree),
             initial_cuts,
             initially_turned,
+            default_sources,
             seconds: clock.seconds,
         })
     }
@@ -213,21 +220,22 @@ impl Propagation {
     }
 }
 
-/// Whether the normal at `root` turns so that the default source of its component points up: the point farthest along
-/// +z, of several the one with the smallest id.
-fn turn_upward(cloud: &PointCloud, normals: &[Vec3], tree: &SpanningTree, root: u32) -> bool {
+/// The default source of the component of `root`: its point farthest along +z, of several the one with the smallest id.
+fn highest(cloud: &PointCloud, tree: &SpanningTree, root: u32) -> u32 {
     let height = |point: u32| cloud.positions()[point as usize].z;
-    let mut top = root;
-    for position in tree.subtree(root) {
-        let (point, highest) = (tree.order()[position as usize], tree.order()[top as usize]);
-        if height(point) > height(highest) || (height(point) == height(highest) && point < highest) {
-            top = position;
-        }
-    }
-    let normal = normals[tree.order()[top as usize] as usize];
-    // A level normal turns toward +y, then +x: its estimated sign is arbitrary and must not show.
-    let points_down = (normal.z, normal.y, normal.x) < (0.0, 0.0, 0.0);
-    points_down ^ tree.phi(top)
+    let component = tree.subtree(root);
+    let points = &tree.order()[component.start as usize..component.end as usize];
+    let higher = |a: u32, b: u32| {
+        let b_is_higher = height(b) > height(a) || (height(b) == height(a) && b < a);
+        if b_is_higher { b } else { a }
+    };
+    points.iter().copied().reduce(higher).unwrap_or_default()
+}
+
+/// Whether a default source's normal must turn to point up. A level one turns toward +y, then +x: its estimated sign is
+/// arbitrary and must not show.
+fn points_down(normal: Vec3) -> bool {
+    (normal.z, normal.y, normal.x) < (0.0, 0.0, 0.0)
 }
 
 fn clamp(k: usize, range: RangeInclusive<usize>) -> usize {

@@ -9,6 +9,9 @@ use glam::Vec3;
 pub enum Origin {
     /// The user's click.
     Picked,
+    /// A component's default source (its point farthest along +z), vouched for when the user first mended a patch beside
+    /// it.
+    Default,
 }
 
 impl Origin {
@@ -16,6 +19,7 @@ impl Origin {
     pub fn label(self) -> &'static str {
         match self {
             Self::Picked => "Picked",
+            Self::Default => "Default",
         }
     }
 }

@@ -9,7 +9,13 @@ use crate::Source;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Edit {
     /// The click: what the user sees at this point is wrong. The point becomes a source of the opposite sign.
+    ///
+    /// Where no source is vouched for yet, the component's default source is vouched for as it is in the same step (Liu et
+    /// al. §3.3 propagate from `p_0` and the picked `p_1`): so a patch turns and not the whole component.
     Mend(u32),
+    /// All that hangs together with this point is wrong: the source that orients it changes to the opposite direction, or
+    /// where no source is vouched for, the point alone becomes one and its whole region turns.
+    TurnWhole(u32),
     /// Sources are added, or take the place of those at the same points.
     AddSources(Vec<Source>),
     /// The sources at these points go.
@@ -23,6 +29,7 @@ impl Edit {
     pub fn label(&self) -> &'static str {
         match self {
             Self::Mend(_) => "Mend",
+            Self::TurnWhole(_) => "Turn whole region",
             Self::AddSources(sources) if sources.len() == 1 => "Add source",
             Self::AddSources(_) => "Add sources",
             Self::RemoveSources(points) if points.len() == 1 => "Remove source",
@@ -35,7 +42,7 @@ impl Edit {
     /// Bytes on the heap.
     pub(super) fn heap_bytes(&self) -> usize {
         match self {
-            Self::Mend(_) => 0,
+            Self::Mend(_) | Self::TurnWhole(_) => 0,
             Self::AddSources(sources) => size_of::<Source>() * sources.capacity(),
             Self::RemoveSources(points) | Self::FlipSources(points) => size_of::<u32>() * points.capacity(),
         }

@@ -56,6 +56,26 @@ impl Derived {
         )
     }
 
+    /// An existing point as the source that a click on it makes.
+    fn mended(&self, point: u32) -> Source {
+        Source {
+            point,
+            normal: -self.oriented_normal(point),
+            origin: Origin::Picked,
+        }
+    }
+
+    /// The default source that is vouched for together with a mend at an existing point: another point of its region, which
+    /// has no source yet.
+    fn default_source_beside(&self, point: u32) -> Option<u32> {
+        let position = self.propagation.tree.position(point);
+        let component = self.propagation.tree.roots().partition_point(|&root| root <= position) - 1;
+        let &default = self.propagation.default_sources.get(component)?;
+        let is_beside =
+            default != point && self.regions.source_of(point).is_none() && self.regions.in_one_region(default, point);
+        is_beside.then_some(default)
+    }
+
     /// The stored normal of an existing point, turned or not.
     fn oriented_normal(&self, point: u32) -> Vec3 {
         let stored = self.propagation.normals[point as usize];
@@ -169,7 +189,19 @@ impl Document {
     pub fn preview_mend(&self, point: u32) -> Result<Change, EditError> {
         let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
         self.check_point(point)?;
-        Ok(derived.regions.preview(point))
+        Ok(derived
+            .regions
+            .preview_beside(point, derived.default_source_beside(point)))
+    }
+
+    /// What `Edit::TurnWhole(point)` would turn, without changing anything.
+    ///
+    /// # Errors
+    /// [`EditError`] as [`Self::apply`].
+    pub fn preview_turn_whole(&self, point: u32) -> Result<Change, EditError> {
+        let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
+        self.check_point(point)?;
+        Ok(derived.regions.region_of(point))
     }
 
     /// Takes the last edit back; `None` when there is none.
@@ -259,15 +291,27 @@ impl Document {
             &Edit::Mend(point) => {
                 let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
                 self.check_point(point)?;
-                let normal = -derived.oriented_normal(point);
-                Box::new([change(
-                    point,
-                    Some(Source {
-                        point,
+                let mut changes = vec![change(point, Some(derived.mended(point)))];
+                if let Some(default) = derived.default_source_beside(point) {
+                    let normal = derived.oriented_normal(default);
+                    let source = Source {
+                        point: default,
                         normal,
-                        origin: Origin::Picked,
-                    }),
-                )])
+                        origin: Origin::Default,
+                    };
+                    changes.push(change(default, Some(source)));
+                    changes.sort_unstable_by_key(|change| change.point);
+                }
+                changes.into()
+            }
+            &Edit::TurnWhole(point) => {
+                let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
+                self.check_point(point)?;
+                let source = match derived.regions.source_of(point) {
+                    Some(source) => self.source(source)?.opposite(),
+                    None => derived.mended(point),
+                };
+                Box::new([change(source.point, Some(source))])
             }
             Edit::AddSources(sources) => {
                 let mut after = BTreeMap::new();

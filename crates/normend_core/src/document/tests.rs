@@ -43,8 +43,15 @@ fn propagation_of(world: &World, normals: &[Vec3]) -> Propagation {
         tree: Arc::clone(&world.tree),
         initial_cuts: world.initial_cuts.clone(),
         initially_turned: world.initially_turned.clone(),
+        default_sources: default_sources(&world.tree),
         seconds: Vec::new(),
     }
+}
+
+/// The last point of each component in preorder: any will do here.
+fn default_sources(tree: &crate::SpanningTree) -> Vec<u32> {
+    let last = |&root: &u32| tree.order()[tree.subtree(root).end as usize - 1];
+    tree.roots().iter().map(last).collect()
 }
 
 /// What Algorithm 1 makes of the document's sources.
@@ -65,6 +72,7 @@ fn expect(document: &Document, world: &World) -> FixedBitSet {
 #[derive(Clone, Debug)]
 enum Act {
     Mend(u32),
+    TurnWhole(u32),
     Add(Vec<(u32, Vec3)>),
     /// Some of the sources, each perhaps twice.
     Remove(Vec<Index>),
@@ -80,6 +88,7 @@ fn acts(n_points: usize) -> impl Strategy<Value = Vec<Act>> {
     let some = || prop::collection::vec(any::<Index>(), 0..5);
     let act = prop_oneof![
         4 => points.clone().prop_map(Act::Mend),
+        1 => points.clone().prop_map(Act::TurnWhole),
         2 => prop::collection::vec((points, directions()), 0..8).prop_map(Act::Add),
         2 => some().prop_map(Act::Remove),
         2 => some().prop_map(Act::Flip),
@@ -110,6 +119,7 @@ fn edit_of(act: &Act, document: &Document) -> Option<Edit> {
     };
     match act {
         Act::Mend(point) => Some(Edit::Mend(*point)),
+        Act::TurnWhole(point) => Some(Edit::TurnWhole(*point)),
         Act::Add(added) => Some(Edit::AddSources(
             added.iter().map(|&(point, normal)| source(point, normal)).collect(),
         )),
@@ -147,6 +157,7 @@ proptest! {
                 (Some(edit), _) => {
                     let preview = match edit {
                         Edit::Mend(point) => Some(document.preview_mend(point).unwrap()),
+                        Edit::TurnWhole(point) => Some(document.preview_turn_whole(point).unwrap()),
                         _ => None,
                     };
                     change = document.apply(edit).unwrap();
@@ -223,8 +234,53 @@ fn row() -> Document {
     let edges: Vec<_> = (0..4).map(|a| (a, a + 1, 0.1, false)).collect();
     let world = World::without_cuts(5, edges);
     let mut document = document_of(5);
-    document.install(propagation_of(&world, &[Vec3::Z; 5]));
+    // Without default sources, as where signs start as given: a first mend turns the whole region.
+    document.install(Propagation {
+        default_sources: Vec::new(),
+        ..propagation_of(&world, &[Vec3::Z; 5])
+    });
     document
+}
+
+#[test]
+fn the_first_mend_vouches_for_the_default_source_too() {
+    let edges = vec![
+        (0, 1, 0.1, false),
+        (1, 2, 0.2, false),
+        (2, 3, 0.9, false),
+        (3, 4, 0.3, false),
+    ];
+    let world = World::without_cuts(5, edges);
+    let mut document = document_of(5);
+    document.install(Propagation {
+        default_sources: vec![0],
+        ..propagation_of(&world, &[Vec3::Z; 5])
+    });
+    let change = document.apply(Edit::Mend(4)).unwrap();
+    assert_eq!(change.n_points(), 2);
+    let (up, down) = (Vec3::Z, -Vec3::Z);
+    assert_eq!(document.oriented_normals().unwrap(), [up, up, up, down, down]);
+    let default = Source {
+        origin: Origin::Default,
+        ..source(0, up)
+    };
+    assert_eq!(
+        document.sources().iter().collect::<Vec<_>>(),
+        [&default, &source(4, down)]
+    );
+    // Who mends the default source itself says that all is wrong.
+    document.undo();
+    assert!(document.sources().is_empty());
+    assert_eq!(document.apply(Edit::Mend(0)).unwrap().n_points(), 5);
+}
+
+#[test]
+fn a_whole_region_turns_with_its_source() {
+    let mut document = row();
+    assert_eq!(document.apply(Edit::TurnWhole(1)).unwrap().n_points(), 5);
+    assert_eq!(document.sources().iter().collect::<Vec<_>>(), [&source(1, -Vec3::Z)]);
+    assert_eq!(document.apply(Edit::TurnWhole(3)).unwrap().n_points(), 5);
+    assert_eq!(document.sources().iter().collect::<Vec<_>>(), [&source(1, Vec3::Z)]);
 }
 
 #[test]

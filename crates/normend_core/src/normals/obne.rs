@@ -36,15 +36,16 @@ pub fn obne(
         }
         let row = neighbors.of(point);
         let mut scatter = Symmetric3::default();
-        for j in 1..offsets.len() {
+        for (j, &offset_j) in offsets.iter().enumerate() {
             let normal_j = initial[row[j] as usize].as_dvec3();
-            for l in 0..j {
-                let edge = offsets[j] - offsets[l];
+            for (&offset_l, &l) in offsets[..j].iter().zip(row) {
+                let edge = offset_j - offset_l;
                 let squared_length = edge.length_squared();
+                // Two neighbors in one place have no edge, and nothing to add.
                 if squared_length > 0.0 {
-                    let normal_l = initial[row[l] as usize].as_dvec3();
+                    let normal_l = initial[l as usize].as_dvec3();
                     let near = (-squared_length / squared_rho).exp();
-                    let varied = variation(normal_j, normal_l, edge, squared_length.sqrt(), diagonal);
+                    let varied = variation(normal_j, normal_l, edge, squared_length, diagonal);
                     scatter.add_outer(near + varied, edge);
                 }
             }
@@ -63,9 +64,10 @@ const FLAT: f64 = 1e-12;
 
 /// `d_jk`, the extent of normal variation between two neighbors, in 0..=1 up to rounding.
 #[inline]
-fn variation(normal_j: DVec3, normal_k: DVec3, edge: DVec3, length: f64, diagonal: f64) -> f64 {
-    let direction = edge / length;
-    let (a, b, c) = (normal_j.dot(direction), normal_k.dot(direction), normal_j.dot(normal_k));
-    let squared_distance = (2.0 - a * a - b * b + 2.0 * (c - a * b).abs()).max(0.0);
-    1.0 - c.abs() * 0.5 * squared_distance.sqrt() / (1.0 + length / diagonal)
+fn variation(normal_j: DVec3, normal_k: DVec3, edge: DVec3, squared_length: f64, diagonal: f64) -> f64 {
+    // a and b times the length: the edge stays as it is, and no direction is computed.
+    let (a, b, c) = (normal_j.dot(edge), normal_k.dot(edge), normal_j.dot(normal_k));
+    let scale = squared_length.recip();
+    let squared_distance = (2.0 - (a * a + b * b) * scale + 2.0 * (c - a * b * scale).abs()).max(0.0);
+    1.0 - c.abs() * 0.5 * squared_distance.sqrt() / (1.0 + squared_length.sqrt() / diagonal)
 }

@@ -9,7 +9,7 @@ pub(super) const K: usize = 6;
 
 /// One radius per point, in the cloud's unit, positive and finite.
 ///
-/// The distance to the sixth neighbor closes a surface of evenly random points but for one pixel in hundreds. A point alone
+/// The distance to the sixth neighbor leaves half a thousandth of a surface open when its points are random, and nothing when A point alone
 /// far outside would be a disc as large as its distance, so a radius is at most three times that of the neighbors' middle.
 pub(super) fn splat_radii(cloud: &PointCloud, neighbors: &Neighbors) -> Vec<f32> {
     let positions = cloud.positions();

@@ -153,9 +153,28 @@ impl Regions {
         Change::from_flips(&flips)
     }
 
+    /// Whether `a` and `b` are in one region.
+    pub fn in_one_region(&self, a: u32, b: u32) -> bool {
+        self.top_of(self.tree.position(a)) == self.top_of(self.tree.position(b))
+    }
+
+    /// All that follows the same sign as `point`: the ranges of its region.
+    pub fn region_of(&self, point: u32) -> Change {
+        let top = self.top_of(self.tree.position(point));
+        let ranges: Vec<_> = self.own_ranges(top, None).collect();
+        Change::from_flips(&ranges)
+    }
+
     /// What [`Self::add`] with the sign that `point` does not have now would turn, without changing anything.
     pub fn preview(&self, point: u32) -> Change {
-        let ranges: Vec<_> = match self.part(self.tree.position(point)) {
+        self.preview_beside(point, None)
+    }
+
+    /// [`Self::preview`] as if `beside`, when given, had been made a source of its present sign before. It is another
+    /// point of the region of `point`, which has no source.
+    pub fn preview_beside(&self, point: u32, beside: Option<u32>) -> Change {
+        let beside = beside.map(|point| self.tree.position(point));
+        let ranges: Vec<_> = match self.part(self.tree.position(point), beside) {
             Part::Whole { top } => self.own_ranges(top, None).collect(),
             Part::Below { cut } => self.own_ranges(cut, None).collect(),
             Part::Above { top, cut, .. } => self.own_ranges(top, Some(cut)).collect(),
@@ -173,11 +192,11 @@ impl Regions {
         position
     }
 
-    /// What a source at `position` orients.
-    fn part(&self, position: u32) -> Part {
+    /// What a source at `position` orients, where a region without a source is taken to have one at `assumed`.
+    fn part(&self, position: u32, assumed: Option<u32>) -> Part {
         let top = self.top_of(position);
-        match self.source_by_top.get(&top) {
-            Some(&old) if old != position => {
+        match self.source_by_top.get(&top).copied().or(assumed) {
+            Some(old) if old != position => {
                 let (cut, is_above_old) = self.heaviest_edge(position, old);
                 if is_above_old {
                     Part::Above { top, cut, old }
@@ -210,7 +229,7 @@ impl Regions {
 
     /// Makes `position` a source, with one cut at most and without turning anything; returns the top of its region.
     fn admit(&mut self, position: u32) -> u32 {
-        let top = match self.part(position) {
+        let top = match self.part(position, None) {
             Part::Whole { top } => top,
             Part::Below { cut } => {
                 self.tops.insert(cut);
