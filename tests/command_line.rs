@@ -532,13 +532,9 @@ fn ctrl_c_stops_the_work_and_leaves_nothing_behind() {
     while !folder.path().join("report.jsonl").exists() {
         std::thread::yield_now();
     }
-    assert!(
-        Command::new("kill")
-            .args(["-INT", &child.id().to_string()])
-            .status()
-            .unwrap()
-            .success()
-    );
+    // The shell's own kill: the program of that name is not everywhere.
+    let interrupt = format!("kill -INT {}", child.id());
+    assert!(Command::new("sh").args(["-c", &interrupt]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
     let err = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(130), "{err}");
