@@ -17,7 +17,11 @@ const HIDDEN_STEP: f32 = 1.0;
 
 // Darkness of creases and of what lies behind an edge.
 const CREASE_STRENGTH: f32 = 60.0;
-const CREASE_LIMIT: f32 = 0.005;
+const CREASE_LIMIT: f32 = 0.006;
+// Steps between the discs of one surface are no creases: up to so many lengths of a pixel, for each pixel to the center
+// of the disc and beyond that.
+const ROUGHNESS: f32 = 0.6;
+const ROUGHNESS_STEP: f32 = 1.0;
 
 struct Look {
     front: vec3<f32>,
@@ -110,11 +114,16 @@ fn visual_depth(bits: u32) -> f32 {
     return depth / frame.pivot_depth;
 }
 
-// How far a pixel lies behind the line between its two neighbors; 0 for planes at any angle.
-fn crease(here: f32, a: vec2<u32>, b: vec2<u32>) -> f32 {
+// Length of a pixel on that scale.
+fn visual_pixel_len() -> f32 {
+    return frame.pixel_len * select(1.0 / frame.pivot_depth, 1.4426950, frame.perspective > 0.5);
+}
+
+// How far a pixel lies behind the line between its two neighbors, beyond `rough`; 0 for planes at any angle.
+fn crease(here: f32, rough: f32, a: vec2<u32>, b: vec2<u32>) -> f32 {
     let before = select(here, visual_depth(a.y), a.x != ID_NONE);
     let after = select(here, visual_depth(b.y), b.x != ID_NONE);
-    return clamp(2.0 * here - before - after, 0.0, CREASE_LIMIT);
+    return clamp(2.0 * here - before - after - rough, 0.0, CREASE_LIMIT);
 }
 
 fn background(y: f32) -> vec3<f32> {
@@ -222,7 +231,7 @@ fn splat_color(pixel: vec2<i32>, id: u32, surface: vec2<u32>, depth: f32) -> vec
         let normal = unpack_normal(surface.x & NORMAL_BITS);
         return select(normal, -normal, is_turned(id - 1u)) * 0.5 + 0.5;
     }
-    let headlight = mix(0.34, 1.0, f32((surface.x >> 22u) & 511u) / 511.0);
+    let headlight = mix(0.4, 1.0, f32((surface.x >> 22u) & 511u) / 511.0);
     return select(look.back, look.front, is_front(pixel, id, surface, depth)) * headlight;
 }
 
@@ -246,7 +255,8 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     let below = textureLoad(seen, vec2<i32>(pixel.x, min(pixel.y + reach, last.y)), 0).xy;
 
     let depth = visual_depth(here.y);
-    let dark = crease(depth, left, right) + crease(depth, above, below);
+    let rough = visual_pixel_len() * (ROUGHNESS * length(vec2<f32>(center_offset(surface))) + ROUGHNESS_STEP);
+    let dark = crease(depth, rough, left, right) + crease(depth, rough, above, below);
     var color = splat_color(pixel, here.x, surface, depth_of(here.y)) * exp(-CREASE_STRENGTH * dark);
 
     if look.n_highlights > 0u && is_highlighted(here.x) {

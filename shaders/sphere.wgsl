@@ -27,8 +27,8 @@ fn vertex(@builtin(vertex_index) vertex_index: u32) -> Vertex {
 
     // The ring of a selected sphere takes room outside of it.
     let radius = frame.sphere_radius * select(1.0, SELECTED_RADIUS, sphere.selected != 0u);
-    // Moved toward the eye by its own radius, so that the surface on which it sits does not hide it.
-    let lift = radius * frame.pixel_len * select(1.0, depth, is_perspective);
+    // Moved toward the eye, so that the surface on which it sits does not hide it unless that is steeper than 63°.
+    let lift = 2.0 * radius * frame.pixel_len * select(1.0, depth, is_perspective);
     let corner = triangle_corner(vertex_index % 3u);
     var position = frame.clip_from_eye * vec4<f32>(center + to_eye * lift, 1.0);
     position = vec4<f32>(position.xy + corner * radius * 2.0 / frame.size * position.w, position.zw);

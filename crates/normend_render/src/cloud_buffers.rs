@@ -155,7 +155,7 @@ impl CloudBuffers {
         let needed = size_of_val(turned.as_slice()) as u64;
         if needed > limit {
             return Err(RenderError::BufferTooLarge {
-                what: "the signs of the points",
+                what: "signs of the points",
                 needed,
                 limit,
             });
@@ -163,7 +163,7 @@ impl CloudBuffers {
         let chunk_points = max_chunk_points.min((limit / size_of::<Point>() as u64) as usize);
         if chunk_points == 0 {
             return Err(RenderError::BufferTooLarge {
-                what: "a point",
+                what: "a single point",
                 needed: size_of::<Point>() as u64,
                 limit,
             });
@@ -347,7 +347,7 @@ mod tests {
     fn merge_joins_what_is_near() {
         let check = |input: &[Range<u32>], expect: &[Range<u32>]| assert_eq!(merge(input, 10), expect);
         check(&[], &[]);
-        check(&[0..3, 5..6], &[0..6]);
+        check(&[0..3, 5..6, 17..18], &[0..6, 17..18]);
         check(&[0..30, 5..6, 50..60], &[0..30, 50..60]);
         check(&[0..1, 11..12, 23..24], &[0..12, 23..24]);
     }

@@ -4,7 +4,9 @@
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
     /// A buffer past the adapter's limits.
-    #[error("{what} needs {needed} bytes in one buffer; this graphics adapter allows {limit}")]
+    #[error(
+        "{what}: {needed} bytes are needed in one buffer, and this graphics adapter allows {limit}; open fewer points"
+    )]
     BufferTooLarge {
         /// What for.
         what: &'static str,

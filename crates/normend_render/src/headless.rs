@@ -16,13 +16,17 @@ pub struct HeadlessDevice {
 }
 
 impl HeadlessDevice {
-    /// Opens the best adapter that can draw splats: graphics cards first, then software. The environment variable
-    /// `WGPU_BACKEND` (`vulkan`, `gl`, …) restricts the choice.
+    /// Opens the best adapter that can draw splats: graphics cards first, then software; OpenGL only where there is
+    /// nothing else. The environment variable `WGPU_BACKEND` (`vulkan`, `gl`, …) restricts the choice.
     ///
     /// # Errors
     /// [`RenderError::NoAdapter`], [`RenderError::Unsupported`] or [`RenderError::Device`], in words for the user.
     pub fn new() -> Result<Self, RenderError> {
-        Self::with_backends(wgpu::Backends::from_env().unwrap_or(wgpu::Backends::all()))
+        match wgpu::Backends::from_env() {
+            Some(backends) => Self::with_backends(backends),
+            None => Self::with_backends(wgpu::Backends::PRIMARY)
+                .or_else(|_| Self::with_backends(wgpu::Backends::PRIMARY | wgpu::Backends::GL)),
+        }
     }
 
     /// Like [`Self::new`], with the given backends only.
@@ -76,4 +80,21 @@ fn rank(adapter: &wgpu::Adapter) -> (u32, u32) {
 fn names(backends: wgpu::Backends) -> String {
     let names: Vec<String> = backends.iter_names().map(|(name, _)| name.to_lowercase()).collect();
     names.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_adapter_is_told_in_words_with_the_packages() {
+        let Err(error) = HeadlessDevice::with_backends(wgpu::Backends::empty()) else {
+            panic!("an adapter of nothing")
+        };
+        let message = error.to_string();
+        assert!(
+            message.contains("mesa-vulkan-drivers") && message.contains("libvulkan1"),
+            "{message}"
+        );
+    }
 }

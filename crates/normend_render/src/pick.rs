@@ -35,7 +35,7 @@ pub enum Hit {
     Sphere {
         /// Index.
         index: u32,
-        /// World point.
+        /// World point on what is drawn, which floats in front of the center by about the sphere's diameter.
         point: Vec3,
     },
 }

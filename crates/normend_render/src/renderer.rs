@@ -18,7 +18,7 @@ use crate::pick::PictureView;
 use crate::{Camera, DrawSettings, PickRequest, Projection, RenderError, Sphere};
 
 /// Radius of a sphere, in points of the user interface.
-const SPHERE_RADIUS: f32 = 5.0;
+const SPHERE_RADIUS: f32 = 6.0;
 /// Storage buffers that a shader stage reads: spheres, signs, highlights.
 const STORAGE_BUFFERS: u32 = 3;
 

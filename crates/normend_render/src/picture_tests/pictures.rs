@@ -1,204 +1,15 @@
 //! What is on pictures of small clouds, counted pixel by pixel on a real device.
 
-use std::f32::consts::PI;
+#![expect(clippy::single_range_in_vec_init, reason = "lists of ranges often hold one")]
 
 use egui_wgpu::wgpu;
 use glam::{UVec2, Vec2, Vec3};
 
-use crate::gpu_types::{ID_NONE, ID_SPHERE};
+use super::scene::{ASPECT, Cloud, Picture, SIZE, Scene};
+use crate::gpu_types::ID_SPHERE;
 use crate::{
-    Camera, DisplayMode, DrawSettings, HeadlessDevice, Hit, Palette, Projection, RenderError, Sphere, SplatRenderer,
-    StandardView,
+    Camera, DisplayMode, HeadlessDevice, Hit, Palette, Projection, RenderError, Sphere, SplatRenderer, StandardView,
 };
-
-const SIZE: [u32; 2] = [320, 240];
-const ASPECT: f32 = SIZE[0] as f32 / SIZE[1] as f32;
-
-/// A device; `None`, said aloud, on a machine without graphics. `NORMEND_REQUIRE_GPU=1` makes that a failure.
-fn device_for(backends: Option<wgpu::Backends>) -> Option<HeadlessDevice> {
-    match backends.map_or_else(HeadlessDevice::new, HeadlessDevice::with_backends) {
-        Ok(device) => Some(device),
-        Err(error) if std::env::var_os("NORMEND_REQUIRE_GPU").is_some_and(|value| value == "1") => panic!("{error}"),
-        Err(error) => {
-            eprintln!("skipped: no graphics adapter ({error})");
-            None
-        }
-    }
-}
-
-/// A small cloud with unit normals and radii that close its surface.
-struct Cloud {
-    positions: Vec<Vec3>,
-    normals: Vec<Vec3>,
-    radii: Vec<f32>,
-}
-
-impl Cloud {
-    /// `n` points spread evenly over a sphere (Fibonacci lattice), normals outward. Ascending in z.
-    fn sphere(n: usize, center: Vec3, radius: f32) -> Self {
-        let golden = PI * (3.0 - 5.0_f32.sqrt());
-        let normals: Vec<Vec3> = (0..n)
-            .map(|i| {
-                let z = (2.0 * i as f32 + 1.0) / n as f32 - 1.0;
-                let (sin, cos) = (golden * i as f32).sin_cos();
-                Vec3::new(cos * (1.0 - z * z).sqrt(), sin * (1.0 - z * z).sqrt(), z)
-            })
-            .collect();
-        let spacing = radius * (4.0 * PI / n as f32).sqrt();
-        Self {
-            positions: normals.iter().map(|&d| center + radius * d).collect(),
-            normals,
-            radii: vec![spacing; n],
-        }
-    }
-
-    /// A square plate in the plane y = `y`, `n` × `n` points, normals toward −y.
-    fn plate(n: usize, y: f32, half: f32) -> Self {
-        let step = 2.0 * half / (n - 1) as f32;
-        let at = |i: usize| step * i as f32 - half;
-        let positions = (0..n * n).map(|i| Vec3::new(at(i % n), y, at(i / n))).collect();
-        Self {
-            positions,
-            normals: vec![Vec3::NEG_Y; n * n],
-            radii: vec![step; n * n],
-        }
-    }
-
-    fn join(mut self, other: Self) -> Self {
-        self.positions.extend(other.positions);
-        self.normals.extend(other.normals);
-        self.radii.extend(other.radii);
-        self
-    }
-
-    /// Cosine between a normal and the direction to the eye.
-    fn cosine(&self, instance: u32, eye: Vec3) -> f32 {
-        let (position, normal) = (self.positions[instance as usize], self.normals[instance as usize]);
-        normal.dot((eye - position).normalize_or_zero())
-    }
-
-    fn len(&self) -> u32 {
-        self.positions.len() as u32
-    }
-}
-
-/// A renderer with a cloud, and what it drew last.
-struct Scene {
-    gpu: HeadlessDevice,
-    renderer: SplatRenderer,
-    camera: Camera,
-    settings: DrawSettings,
-}
-
-impl Scene {
-    fn new(cloud: &Cloud) -> Option<Self> {
-        Self::with(cloud, None, usize::MAX)
-    }
-
-    fn with(cloud: &Cloud, backends: Option<wgpu::Backends>, chunk_points: usize) -> Option<Self> {
-        let gpu = device_for(backends)?;
-        let mut renderer = match chunk_points {
-            usize::MAX => SplatRenderer::new(&gpu.device),
-            n => SplatRenderer::with_chunks(&gpu.device, n),
-        };
-        let Cloud {
-            positions,
-            normals,
-            radii,
-        } = cloud;
-        renderer
-            .set_cloud(&gpu.device, &gpu.queue, positions, Some(normals), radii, None)
-            .unwrap();
-        let camera = Camera::framing(Vec3::splat(-1.0), Vec3::ONE, StandardView::Front, ASPECT);
-        Some(Self {
-            gpu,
-            renderer,
-            camera,
-            settings: DrawSettings::default(),
-        })
-    }
-
-    fn draw(&mut self) -> bool {
-        let HeadlessDevice { device, queue, .. } = &self.gpu;
-        self.renderer
-            .draw(device, queue, &self.camera, SIZE, 1.0, &self.settings)
-    }
-
-    /// Draws and reads colors and ids back.
-    fn shoot(&mut self) -> Picture {
-        self.draw();
-        let HeadlessDevice { device, queue, .. } = &self.gpu;
-        let (size, bytes) = self.renderer.read_picture(device, queue).unwrap();
-        assert_eq!(size, SIZE);
-        let colors = bytes.chunks_exact(4).map(|c| [c[0], c[1], c[2]]).collect();
-        let ids = self
-            .renderer
-            .read_seen(device, queue)
-            .unwrap()
-            .iter()
-            .map(|seen| seen[0])
-            .collect();
-        Picture { colors, ids }
-    }
-
-    fn turn(&mut self, ranges: &[std::ops::Range<u32>]) {
-        self.renderer.turn(&self.gpu.queue, ranges);
-    }
-
-    fn highlight(&mut self, ranges: &[std::ops::Range<u32>]) {
-        self.renderer.set_highlight(&self.gpu.device, &self.gpu.queue, ranges);
-    }
-
-    fn set_spheres(&mut self, spheres: &[Sphere]) {
-        self.renderer.set_spheres(&self.gpu.device, &self.gpu.queue, spheres);
-    }
-
-    fn pick(&self, x: u32, y: u32) -> Option<Hit> {
-        self.renderer
-            .pick(&self.gpu.device, &self.gpu.queue, [x, y])
-            .unwrap()
-            .wait(&self.gpu.device)
-    }
-}
-
-#[derive(Clone, PartialEq)]
-struct Picture {
-    colors: Vec<[u8; 3]>,
-    ids: Vec<u32>,
-}
-
-impl Picture {
-    fn is_front(color: [u8; 3]) -> bool {
-        color[2] > color[0]
-    }
-
-    fn splats(&self) -> impl Iterator<Item = (u32, [u8; 3])> {
-        let pairs = self.ids.iter().zip(&self.colors);
-        pairs
-            .filter(|(id, _)| **id != ID_NONE && **id & ID_SPHERE == 0)
-            .map(|(id, color)| (id - 1, *color))
-    }
-
-    /// Pixels of splats that show their front, and all pixels of splats.
-    fn count_front(&self) -> (usize, usize) {
-        let front = self.splats().filter(|&(_, color)| Self::is_front(color)).count();
-        (front, self.splats().count())
-    }
-
-    /// Background pixels that have splats to their left, right, above and below: holes in a convex silhouette.
-    fn count_holes(&self) -> usize {
-        let [width, height] = SIZE.map(|len| len as usize);
-        let seen = |x: usize, y: usize| self.ids[y * width + x] != ID_NONE;
-        let hole = |x: usize, y: usize| {
-            !seen(x, y)
-                && (0..x).any(|x| seen(x, y))
-                && (x..width).any(|x| seen(x, y))
-                && (0..y).any(|y| seen(x, y))
-                && (y..height).any(|y| seen(x, y))
-        };
-        (0..width * height).filter(|i| hole(i % width, i / width)).count()
-    }
-}
 
 #[test]
 fn a_sphere_is_closed_and_all_front_from_outside_at_any_zoom() {
@@ -451,10 +262,10 @@ fn spheres_are_seen_on_their_surface_and_picked_and_hidden_behind_others() {
     scene.set_spheres(&spheres);
     let picture = scene.shoot();
     let count = |index: u32| picture.ids.iter().filter(|id| **id == ID_SPHERE | index).count();
-    // A disc of radius 5 pixels, and one of radius 8.5 with its ring.
-    assert!((70..=88).contains(&count(0)), "{}", count(0));
+    // A disc of radius 6 pixels, and one of radius 10.2 with its ring.
+    assert!((105..=121).contains(&count(0)), "{}", count(0));
     assert_eq!(count(1), 0, "the sphere on the far side shines through");
-    assert!((210..=245).contains(&count(2)), "{}", count(2));
+    assert!((310..=343).contains(&count(2)), "{}", count(2));
     let size = UVec2::from(SIZE).as_vec2();
     for (index, mark) in [(0, &spheres[0]), (2, &spheres[2])] {
         let at = scene.camera.project(mark.center, size).unwrap().as_uvec2();
@@ -462,7 +273,7 @@ fn spheres_are_seen_on_their_surface_and_picked_and_hidden_behind_others() {
             panic!("no sphere at {at}")
         };
         assert_eq!(found, index);
-        assert!(point.distance(mark.center) < 0.1, "{point}");
+        assert!(point.distance(mark.center) < 0.2, "{point}");
         let [red, green, blue] = picture.colors[(at.y * SIZE[0] + at.x) as usize];
         assert!(green > 150 && red < 80 && blue < 80, "{red} {green} {blue}");
     }
@@ -554,6 +365,38 @@ fn bad_slices_are_refused_in_words_and_leave_no_cloud() {
         .set_cloud(device, queue, &[Vec3::ZERO; 3], Some(&[Vec3::ZERO; 3]), &radii, None)
         .unwrap();
     assert!(scene.shoot().splats().count() > 0);
+}
+
+#[test]
+fn limits_of_the_adapter_are_kept_by_chunks_or_told_in_words() {
+    let cloud = Cloud::sphere(2_000, Vec3::ZERO, 1.0);
+    let Some(mut scene) = Scene::new(&cloud) else { return };
+    let whole = scene.shoot();
+    let mut descriptor = SplatRenderer::device_descriptor(&scene.gpu.adapter);
+    descriptor.required_limits.max_storage_buffer_binding_size = 256;
+    let (device, queue) = pollster::block_on(scene.gpu.adapter.request_device(&descriptor)).unwrap();
+    scene.renderer = SplatRenderer::new(&device);
+    (scene.gpu.device, scene.gpu.queue) = (device, queue);
+    let HeadlessDevice { device, queue, .. } = &scene.gpu;
+    // 16 points fit into a binding, and the signs of 2048.
+    let Cloud {
+        positions,
+        normals,
+        radii,
+    } = &cloud;
+    scene
+        .renderer
+        .set_cloud(device, queue, positions, Some(normals), radii, None)
+        .unwrap();
+    assert!(scene.shoot() == whole);
+    let HeadlessDevice { device, queue, .. } = &scene.gpu;
+    let error = scene
+        .renderer
+        .set_cloud(device, queue, &[Vec3::ZERO; 2_049], None, &[1.0; 2_049], None)
+        .unwrap_err();
+    let expect = "signs of the points: 260 bytes are needed in one buffer, and this graphics adapter allows 256; open fewer points";
+    assert_eq!(error.to_string(), expect);
+    assert_eq!(scene.shoot().splats().count(), 0);
 }
 
 #[test]

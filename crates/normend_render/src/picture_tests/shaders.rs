@@ -7,16 +7,20 @@ use egui_wgpu::wgpu::naga;
 use crate::gpu_types::{Chunk, Frame, Look, Point, SphereMark};
 use crate::shader::{SHADE, SPHERE, SPLAT, Shader};
 
-/// A struct of Rust: its name, its size, its fields with their offsets.
-type Twin = (&'static str, usize, Vec<(&'static str, usize)>);
+/// A struct: its name, its size, its fields with their offsets.
+type Layout = (String, usize, Vec<(String, usize)>);
 
 macro_rules! twin {
     ($name:ident: $($field:ident),+) => {
-        (stringify!($name), size_of::<$name>(), vec![$((stringify!($field), offset_of!($name, $field))),+])
+        (
+            stringify!($name).to_owned(),
+            size_of::<$name>(),
+            vec![$((stringify!($field).to_owned(), offset_of!($name, $field))),+],
+        )
     };
 }
 
-fn twins() -> Vec<Twin> {
+fn twins() -> Vec<Layout> {
     vec![
         twin!(Frame: clip_from_eye, eye, perspective, right, pixel_len, back, max_radius, depth_from_clip,
               scene_depth, size, pivot_depth, sphere_radius, line_width, stride),
@@ -37,10 +41,10 @@ fn validate(name: &str, source: &str) -> Result<naga::Module, String> {
 }
 
 /// The structs of a module that have a twin, in the twins' form.
-fn layouts(module: &naga::Module) -> Vec<(String, usize, Vec<(String, usize)>)> {
-    let known: Vec<&str> = twins().iter().map(|twin| twin.0).collect();
+fn layouts(module: &naga::Module) -> Vec<Layout> {
+    let known: Vec<String> = twins().into_iter().map(|twin| twin.0).collect();
     let structs = module.types.iter().filter_map(|(_, ty)| match (&ty.name, &ty.inner) {
-        (Some(name), naga::TypeInner::Struct { members, span }) if known.contains(&name.as_str()) => {
+        (Some(name), naga::TypeInner::Struct { members, span }) if known.contains(name) => {
             let fields = members
                 .iter()
                 .map(|m| (m.name.clone().unwrap(), m.offset as usize))
@@ -57,15 +61,14 @@ fn shaders_are_valid_and_their_structs_match() {
     let mut seen = Vec::new();
     for Shader { name, source } in [SPLAT, SPHERE, SHADE] {
         let module = validate(name, source).unwrap_or_else(|message| panic!("{name}: {message}"));
-        for (found, size, fields) in layouts(&module) {
-            let (_, expect_size, expect) = twins().into_iter().find(|twin| twin.0 == found).unwrap();
-            let expect: Vec<(String, usize)> = expect.into_iter().map(|(n, offset)| (n.to_owned(), offset)).collect();
-            assert_eq!((size, &fields), (expect_size, &expect), "{found} in {name}");
-            seen.push(found);
+        for layout in layouts(&module) {
+            let expect = twins().into_iter().find(|twin| twin.0 == layout.0).unwrap();
+            assert_eq!(layout, expect, "in {name}");
+            seen.push(layout.0);
         }
     }
     for (name, ..) in twins() {
-        assert!(seen.iter().any(|found| found == name), "{name} is in no shader");
+        assert!(seen.contains(&name), "{name} is in no shader");
     }
 }
 
