@@ -414,6 +414,10 @@ fn sources_are_selected_flipped_and_removed() {
     editor.harness.run_steps(60);
     editor.harness.get_by_label_contains(&row).click();
     editor.harness.run_steps(2);
+    assert!(
+        editor.app().availability(Command::RemoveSources).is_ok(),
+        "the row was not selected"
+    );
     editor.click_button("Remove");
     assert_eq!((editor.bits(), editor.n_sources()), (bits, 0));
     editor.key(Modifiers::COMMAND, Key::Z);
@@ -650,7 +654,7 @@ fn the_sample_has_something_to_mend() {
     let (place, n_would_turn) = editor.hover_wrong_patch();
     assert!(n_would_turn > 0);
     editor.click(place);
-    editor.wait("a source", |app| app.document().unwrap().sources().len() == 1);
+    editor.wait("a source", |app| !app.document().unwrap().sources().is_empty());
 }
 
 #[test]

@@ -52,7 +52,7 @@ impl App {
                 document.and_then(Document::next_redo).is_some(),
                 "there is nothing to redo",
             ),
-            Command::MendHere => check(is_oriented, "the scan is not oriented yet"),
+            Command::MendHere | Command::TurnWholeHere => check(is_oriented, "the scan is not oriented yet"),
             Command::SelectAllSources => check(
                 document.is_some_and(|document| !document.sources().is_empty()),
                 "there are no sources",
@@ -133,14 +133,8 @@ impl App {
             Command::Quit => self.ctx.send_viewport_cmd(egui::ViewportCommand::Close),
             Command::Undo => self.step_history(Session::undo),
             Command::Redo => self.step_history(Session::redo),
-            Command::MendHere => {
-                let pixel = self.meant_pixel();
-                let event = self
-                    .scene
-                    .as_ref()
-                    .and_then(|scene| self.mend.click(scene, pixel, false));
-                self.handle(event);
-            }
+            Command::MendHere => self.click_here(egui::Modifiers::NONE),
+            Command::TurnWholeHere => self.click_here(egui::Modifiers::COMMAND),
             Command::SetPivot => {
                 let pixel = self.meant_pixel();
                 let event = self.scene.as_ref().and_then(|scene| self.mend.pivot(scene, pixel));
@@ -184,6 +178,15 @@ impl App {
             Command::Log => self.windows.log = !self.windows.log,
             Command::About => self.windows.about = !self.windows.about,
         }
+    }
+
+    fn click_here(&mut self, modifiers: egui::Modifiers) {
+        let pixel = self.meant_pixel();
+        let event = self
+            .scene
+            .as_ref()
+            .and_then(|scene| self.mend.click(scene, pixel, modifiers));
+        self.handle(event);
     }
 
     fn scale_splats(&mut self, factor: f32) {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::mpsc;
 
 use egui::{CentralPanel, Panel, ScrollArea, Ui};
-use normend_core::Document;
+use normend_core::{Document, Edit};
 use normend_render::{DisplayMode, DrawSettings, SplatRenderer};
 
 use crate::command::{Action, Command, take_shortcuts};
@@ -219,6 +219,10 @@ impl App {
     }
 
     fn take_keys(&mut self) {
+        // An open menu or list has the keyboard: Escape closes it, arrows move in it.
+        if egui::Popup::is_any_open(&self.ctx) {
+            return;
+        }
         let typing = self.ctx.text_edit_focused();
         let focused = self.ctx.memory(|memory| memory.focused());
         let widget_focused = focused.is_some() && focused != self.viewport.id();
@@ -313,7 +317,7 @@ impl App {
         );
         let asked = match (pointer.clicked, pointer.pivot) {
             (_, Some(pixel)) => self.mend.pivot(scene, pixel),
-            (Some((pixel, shift)), None) => self.mend.click(scene, pixel, shift),
+            (Some(pixel), None) => self.mend.click(scene, pixel, pointer.modifiers),
             (None, None) => None,
         };
         if pointer.by_double_click {
@@ -350,14 +354,17 @@ impl App {
     pub(crate) fn handle(&mut self, event: Option<ToolEvent>) {
         match event {
             None => {}
-            Some(ToolEvent::Mend(point)) => {
-                self.apply_edit(normend_core::Edit::Mend(point));
-                self.clicked_revision = self.document().map(Document::revision);
-            }
+            Some(ToolEvent::Mend(point)) => self.apply_click(Edit::Mend(point)),
+            Some(ToolEvent::TurnWhole(point)) => self.apply_click(Edit::TurnWhole(point)),
             Some(ToolEvent::SelectSource { point, extend }) => self.act(Action::SelectSource { point, extend }),
             Some(ToolEvent::Deselect) => self.deselect(),
             Some(ToolEvent::Pivot(point)) => self.viewport.camera.set_pivot(point),
         }
+    }
+
+    fn apply_click(&mut self, edit: Edit) {
+        self.apply_edit(edit);
+        self.clicked_revision = self.document().map(Document::revision);
     }
 
     /// The pixel that keyboard commands mean: under the pointer, else the middle of the view.

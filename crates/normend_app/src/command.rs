@@ -25,6 +25,8 @@ pub enum Command {
     Redo,
     /// Mend what is under the pointer.
     MendHere,
+    /// Turn all that hangs together with what is under the pointer.
+    TurnWholeHere,
     /// Select every source.
     SelectAllSources,
     /// Turn the selected sources.
@@ -158,6 +160,10 @@ const fn ctrl(logical_key: Key) -> KeyboardShortcut {
     KeyboardShortcut::new(Modifiers::COMMAND, logical_key)
 }
 
+const fn shift(logical_key: Key) -> KeyboardShortcut {
+    KeyboardShortcut::new(Modifiers::SHIFT, logical_key)
+}
+
 const fn ctrl_shift(logical_key: Key) -> KeyboardShortcut {
     KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), logical_key)
 }
@@ -170,7 +176,7 @@ macro_rules! row {
 
 impl Command {
     /// All commands, in the order of menus.
-    pub const ALL: [Self; 35] = [
+    pub const ALL: [Self; 36] = [
         Self::Open,
         Self::OpenPath,
         Self::OpenSample,
@@ -179,6 +185,7 @@ impl Command {
         Self::Undo,
         Self::Redo,
         Self::MendHere,
+        Self::TurnWholeHere,
         Self::SelectAllSources,
         Self::FlipSources,
         Self::RemoveSources,
@@ -221,6 +228,9 @@ impl Command {
                 row!(Edit 0, "Redo", "Apply the last undone edit again", [ctrl_shift(Key::Z), ctrl(Key::Y)])
             }
             Self::MendHere => row!(Edit 1, "Mend here", "Turn the region under the pointer", [key(Key::Enter)]),
+            Self::TurnWholeHere => {
+                row!(Edit 1, "Turn whole region here", "Turn all that hangs together with the point under the pointer", [shift(Key::Enter)])
+            }
             Self::SelectAllSources => row!(Edit 2, "Select all sources", "Select every source", [ctrl(Key::A)]),
             Self::FlipSources => row!(Edit 2, "Flip sources", "Turn the selected sources", [key(Key::X)]),
             Self::RemoveSources => {
@@ -306,9 +316,10 @@ impl Command {
 }
 
 /// What the mouse does in the 3D view: the second half of the sheet of shortcuts.
-pub const MOUSE: [(&str, &str); 9] = [
+pub const MOUSE: [(&str, &str); 10] = [
     ("Move over the scan", "Show what a click would turn"),
     ("Click", "Mend: turn the wrong region"),
+    ("Ctrl-click", "Turn all that hangs together"),
     ("Click a source", "Select it; with Shift, add to the selection"),
     ("Left drag", "Orbit"),
     ("Right, middle or Shift-left drag", "Pan"),

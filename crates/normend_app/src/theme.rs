@@ -85,7 +85,7 @@ pub fn apply(ctx: &egui::Context) {
     ctx.all_styles_mut(|style| {
         let font = |size| FontId::new(size, FontFamily::Proportional);
         style.text_styles = [
-            (TextStyle::Heading, font(22.0)),
+            (TextStyle::Heading, font(17.0)),
             (TextStyle::Body, font(14.0)),
             (TextStyle::Button, font(14.0)),
             (TextStyle::Small, font(12.0)),

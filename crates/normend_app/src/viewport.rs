@@ -1,6 +1,6 @@
 //! The 3D view: pointer and camera, the picture, and the marks drawn over it.
 
-use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Stroke, StrokeKind, Ui, Vec2};
+use egui::{Align2, Color32, FontId, Modifiers, PointerButton, Pos2, Rect, Sense, Stroke, StrokeKind, Ui, Vec2};
 use glam::Vec3;
 use normend_core::PointCloud;
 use normend_render::{Camera, DrawSettings, Projection, StandardView};
@@ -33,8 +33,10 @@ pub struct PointerOnView {
     pub hovered: Option<Pixel>,
     /// Where the pointer is, in points.
     pub position: Option<Pos2>,
-    /// A click with the main button: where, and whether Shift was held.
-    pub clicked: Option<(Pixel, bool)>,
+    /// A click with the main button.
+    pub clicked: Option<Pixel>,
+    /// The modifier keys that are held.
+    pub modifiers: Modifiers,
     /// A double-click or a middle click: the pivot goes there.
     pub pivot: Option<Pixel>,
     /// The pivot was asked for by a double-click, whose first click counted as a click.
@@ -185,9 +187,8 @@ impl Viewport {
         PointerOnView {
             hovered: position.filter(|_| resting).and_then(|position| self.pixel(position)),
             position,
-            clicked: clicked_at
-                .filter(|_| response.clicked_by(PointerButton::Primary) && !double_clicked)
-                .map(|pixel| (pixel, ui.input(|input| input.modifiers.shift))),
+            clicked: clicked_at.filter(|_| response.clicked_by(PointerButton::Primary) && !double_clicked),
+            modifiers: ui.input(|input| input.modifiers),
             pivot: clicked_at.filter(|_| pivot),
             by_double_click: double_clicked,
         }

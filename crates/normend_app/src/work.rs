@@ -18,7 +18,7 @@ pub enum ScanOrigin {
     Sample,
 }
 
-const SAMPLE: &[u8] = &[] /* SAMPLE */;
+const SAMPLE: &[u8] = include_bytes!("../../../assets/sample.ply");
 const SAMPLE_NAME: &str = "sample.ply";
 
 impl ScanOrigin {

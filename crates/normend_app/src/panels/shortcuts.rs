@@ -14,18 +14,21 @@ pub fn ui(ui: &Ui, open: &mut bool) {
         .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
         .show(ui.ctx(), |ui| {
             let height = (ui.ctx().content_rect().height() - 140.0).max(200.0);
-            ScrollArea::vertical().max_height(height).show(ui, |ui| {
-                ui.horizontal_top(|ui| {
-                    ui.spacing_mut().item_spacing.x = 2.0 * SPACE_L;
-                    ui.vertical(|ui| {
-                        mouse(ui);
-                        for menu in [Menu::File, Menu::Edit, Menu::Help] {
-                            keys(ui, menu);
-                        }
+            ScrollArea::vertical()
+                .max_height(height)
+                .min_scrolled_height(height)
+                .show(ui, |ui| {
+                    ui.horizontal_top(|ui| {
+                        ui.spacing_mut().item_spacing.x = 2.0 * SPACE_L;
+                        ui.vertical(|ui| {
+                            mouse(ui);
+                            for menu in [Menu::File, Menu::Edit, Menu::Help] {
+                                keys(ui, menu);
+                            }
+                        });
+                        ui.vertical(|ui| keys(ui, Menu::View));
                     });
-                    ui.vertical(|ui| keys(ui, Menu::View));
                 });
-            });
         });
 }
 

@@ -1,4 +1,4 @@
-//! The side panel: the scan, the propagation's parameters, the view, the sources.
+//! The side panel: the scan, the propagation's parameters, the sources, the view.
 
 use egui::{Button, Color32, ComboBox, DragValue, RichText, Slider, Ui, Vec2};
 use normend_core::{EdgeRule, Estimator, Parameters, Start};
@@ -28,10 +28,10 @@ pub fn ui(
     if let Some(chosen) = theme::section(ui, "Propagation", |ui| propagation(ui, session, propagating, blocked)) {
         action = Some(chosen);
     }
-    theme::section(ui, "View", |ui| view(ui, settings, mode, palette));
     if let Some(chosen) = theme::section(ui, "Sources", |ui| sources::ui(ui, session)) {
         action = Some(chosen);
     }
+    theme::section(ui, "View", |ui| view(ui, settings, mode, palette));
     action
 }
 
@@ -39,8 +39,11 @@ fn scan(ui: &mut Ui, session: &Session) {
     theme::rows(ui, "scan", |ui| {
         // Rows that are only read stand closer than rows with inputs.
         ui.spacing_mut().interact_size.y = 18.0;
-        theme::row(ui, "Name", &session.name);
-        theme::row(ui, "Format", session.scan.format.label());
+        theme::row(
+            ui,
+            "File",
+            format!("{} ({})", session.name, session.scan.format.label()),
+        );
         theme::row(ui, "Points", theme::thousands(session.scan.cloud.n_points() as u64));
         if session.scan.n_left_out > 0 {
             ui.label(RichText::new("Left out").weak());

@@ -8,7 +8,7 @@ use crate::session::Session;
 use crate::theme::{self, SPACE_S, SPACE_XS};
 
 const ROW_HEIGHT: f32 = 24.0;
-const LIST_HEIGHT: f32 = 240.0;
+const LIST_HEIGHT: f32 = 180.0;
 
 /// The list and its buttons.
 pub fn ui(ui: &mut Ui, session: &Session) -> Option<Action> {

@@ -3,6 +3,7 @@
 //! Picking reads ids back from the GPU, which takes a frame or more, so at most one pick is under way. A click at the
 //! pixel and picture of the last answer acts at once; another click is picked first and acts when the answer arrives.
 
+use egui::Modifiers;
 use normend_core::Change;
 use normend_render::PickRequest;
 
@@ -21,7 +22,7 @@ struct Place {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Purpose {
     Hover,
-    Click { extend: bool },
+    Click(Modifiers),
     Pivot,
 }
 
@@ -74,9 +75,16 @@ pub struct MendTool {
 }
 
 struct Preview {
-    point: u32,
-    revision: u64,
+    of: Previewed,
     change: Change,
+}
+
+/// What a preview depends on.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Previewed {
+    point: u32,
+    whole: bool,
+    revision: u64,
 }
 
 impl MendTool {
@@ -101,10 +109,11 @@ impl MendTool {
         scene.highlight(None);
     }
 
-    /// Asks for the point at `pixel` to be mended.
-    pub fn click(&mut self, scene: &Scene, pixel: Pixel, extend: bool) -> Option<ToolEvent> {
+    /// Asks for the point at `pixel` to be mended; with Ctrl (Command on macOS), for all that hangs together with it to
+    /// be turned. On a source, selects it; with Shift, beside the others.
+    pub fn click(&mut self, scene: &Scene, pixel: Pixel, modifiers: Modifiers) -> Option<ToolEvent> {
         self.quiet = Some(pixel);
-        self.act(scene, pixel, Purpose::Click { extend })
+        self.act(scene, pixel, Purpose::Click(modifiers))
     }
 
     /// Asks for the point at `pixel` to become the pivot.
@@ -172,27 +181,34 @@ impl MendTool {
             }
             None => {}
         }
-        self.follow(scene, session);
+        self.follow(scene, session, pointer.modifiers.command);
         result
     }
 
-    fn follow(&mut self, scene: &mut Scene, session: &Session) {
+    fn follow(&mut self, scene: &mut Scene, session: &Session, whole: bool) {
         let revision = session.document.revision();
         let point = match self.target() {
             Some(Target::Point { point, .. }) if self.quiet.is_none() => Some(point),
             _ => None,
         };
-        let known = self.preview.as_ref().map(|preview| (preview.point, preview.revision));
-        if known == point.map(|point| (point, revision)) {
+        let wanted = point.map(|point| Previewed { point, whole, revision });
+        if wanted == self.preview.as_ref().map(|preview| preview.of) {
             return;
         }
-        let change = point.and_then(|point| session.document.preview_mend(point).ok().map(|change| (point, change)));
-        scene.highlight(change.as_ref().map(|(_, change)| change));
-        self.preview = change.map(|(point, change)| Preview {
-            point,
-            revision,
-            change,
+        let document = &session.document;
+        self.preview = wanted.and_then(|of| {
+            let change = if whole {
+                document.preview_turn_whole(of.point)
+            } else {
+                document.preview_mend(of.point)
+            };
+            // Before the scan is oriented there is nothing to show.
+            Some(Preview {
+                of,
+                change: change.ok()?,
+            })
         });
+        scene.highlight(self.preview.as_ref().map(|preview| &preview.change));
     }
 }
 
@@ -200,10 +216,14 @@ fn event(purpose: Purpose, target: Option<Target>) -> Option<ToolEvent> {
     match (purpose, target) {
         (Purpose::Hover, _) | (Purpose::Pivot, None) => None,
         (Purpose::Pivot, Some(target)) => Some(ToolEvent::Pivot(target.position())),
-        (Purpose::Click { .. }, Some(Target::Point { point, .. })) => Some(ToolEvent::Mend(point)),
-        (Purpose::Click { extend }, Some(Target::Source { point, .. })) => {
-            Some(ToolEvent::SelectSource { point, extend })
+        (Purpose::Click(modifiers), Some(Target::Point { point, .. })) if modifiers.command => {
+            Some(ToolEvent::TurnWhole(point))
         }
-        (Purpose::Click { .. }, None) => Some(ToolEvent::Deselect),
+        (Purpose::Click(_), Some(Target::Point { point, .. })) => Some(ToolEvent::Mend(point)),
+        (Purpose::Click(modifiers), Some(Target::Source { point, .. })) => Some(ToolEvent::SelectSource {
+            point,
+            extend: modifiers.shift || modifiers.command,
+        }),
+        (Purpose::Click(_), None) => Some(ToolEvent::Deselect),
     }
 }

@@ -34,6 +34,8 @@ impl Tool {
 pub enum ToolEvent {
     /// Mend at this point.
     Mend(u32),
+    /// Turn all that hangs together with this point.
+    TurnWhole(u32),
     /// Select the source at this point.
     SelectSource {
         /// The point's id.
