@@ -287,6 +287,38 @@ fn text_keeps_its_separators_comments_and_columns() {
     );
 }
 
+/// Rows are read and written in parts, by as many threads as there are.
+#[test]
+fn many_rows_come_out_the_same_for_any_number_of_threads() {
+    use std::fmt::Write;
+    let (mut input, mut expect) = ("60000\n".to_owned(), "60000\n".to_owned());
+    let mut normals = Vec::new();
+    for row in 0..60_000 {
+        let comment = if row % 1000 == 7 { "# in between\n" } else { "" };
+        let normal = if row % 3 == 0 { Vec3::NEG_X } else { Vec3::Y };
+        writeln!(input, "{comment}{row} {}.5 0 {}", row % 77, row % 256).unwrap();
+        let Vec3 { x, y, z } = normal;
+        writeln!(expect, "{comment}{row} {}.5 0 {x} {y} {z} {}", row % 77, row % 256).unwrap();
+        normals.push(normal);
+    }
+    for n_threads in [1, 4] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+        pool.install(|| {
+            let scan = scan("many.pts", &input);
+            assert_eq!(scan.cloud.n_points(), 60_000);
+            assert_eq!(points(&scan)[59_999], DVec3::new(59_999.0, 16.5, 0.0));
+            assert!(written(&scan, &normals, "out.pts") == expect.as_bytes());
+        });
+    }
+    // The first wrong line is named, whichever thread met one first.
+    let broken = input.replace("\n20000 ", "\n2OOOO ").replace("\n50000 ", "\n5OOOO ");
+    let error = read_bytes(broken.into_bytes(), "many.pts", &Silent).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "many.pts, line 20022: x is \"2OOOO\", which is not a number: correct it"
+    );
+}
+
 #[test]
 fn columns_four_to_six_are_normals_only_when_they_look_like_it() {
     let check = |text: &str, expect: bool| {
