@@ -9,8 +9,9 @@ pub(super) const K: usize = 6;
 
 /// One radius per point, in the cloud's unit, positive and finite.
 ///
-/// The distance to the sixth neighbor leaves half a thousandth of a surface open when its points are random, and nothing when A point alone
-/// far outside would be a disc as large as its distance, so a radius is at most three times that of the neighbors' middle.
+/// Discs as large as the distance to the sixth neighbor leave half a thousandth of a surface open when its points are
+/// random, and nothing when they are even. A point alone far outside would be a disc as large as its distance, so a radius
+/// is at most three times that of the neighbors' middle.
 pub(super) fn splat_radii(cloud: &PointCloud, neighbors: &Neighbors) -> Vec<f32> {
     let positions = cloud.positions();
     let k = K.min(neighbors.k());

@@ -1,4 +1,4 @@
-//! Points on the surface of a union of blocks and cylinders with holes in it.
+//! Points on the surface of a union of blocks, cylinders and balls with holes of these shapes in it.
 
 use std::f64::consts::TAU;
 
@@ -22,31 +22,15 @@ pub(super) enum Primitive {
         radius: f64,
         half_length: f64,
     },
-}
-
-/// A hole in a solid.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Cavity {
-    pub primitive: Primitive,
-    /// Width of the strip along the hole's rims that has no points.
-    pub unseen_rim: f64,
-}
-
-impl Cavity {
-    /// A hole with points up to its rims.
-    pub fn closed(primitive: Primitive) -> Self {
-        Self {
-            primitive,
-            unseen_rim: 0.0,
-        }
-    }
+    /// A ball.
+    Ball { center: DVec3, radius: f64 },
 }
 
 /// The union of parts without the cavities.
 #[derive(Clone, Debug)]
 pub(super) struct Solid {
     pub parts: Vec<Primitive>,
-    pub cavities: Vec<Cavity>,
+    pub cavities: Vec<Primitive>,
 }
 
 /// A point on the surface with its outward normal.
@@ -88,10 +72,7 @@ impl Solid {
             let is_outside_others = |point: DVec3| {
                 self.parts[..i].iter().all(|other| !other.contains(point, -ROUNDING))
                     && self.parts[i + 1..].iter().all(|other| !other.contains(point, ROUNDING))
-                    && self
-                        .cavities
-                        .iter()
-                        .all(|cavity| !cavity.primitive.contains(point, ROUNDING))
+                    && self.cavities.iter().all(|cavity| !cavity.contains(point, ROUNDING))
             };
             let visible = part.sample(density).into_iter();
             samples.extend(visible.filter(|sample| is_outside_others(sample.0)));
@@ -99,12 +80,10 @@ impl Solid {
         for (i, cavity) in self.cavities.iter().enumerate() {
             let is_in_material = |point: DVec3| {
                 let mut others = self.cavities[..i].iter().chain(&self.cavities[i + 1..]);
-                self.parts
-                    .iter()
-                    .any(|part| part.contains(point, ROUNDING + cavity.unseen_rim))
-                    && others.all(|other| !other.primitive.contains(point, ROUNDING))
+                self.parts.iter().any(|part| part.contains(point, ROUNDING))
+                    && others.all(|other| !other.contains(point, ROUNDING))
             };
-            let walls = cavity.primitive.sample(density).into_iter();
+            let walls = cavity.sample(density).into_iter();
             samples.extend(
                 walls
                     .filter(|wall| is_in_material(wall.0))
@@ -130,6 +109,10 @@ impl Primitive {
         }
     }
 
+    pub fn ball(center: DVec3, radius: f64) -> Self {
+        Self::Ball { center, radius }
+    }
+
     /// Whether `point` is inside and at least `margin` from the surface; a negative one lets points outside in.
     fn contains(&self, point: DVec3, margin: f64) -> bool {
         match *self {
@@ -144,6 +127,7 @@ impl Primitive {
                 let across = (point - center - along * axis).length();
                 along.abs() < half_length - margin && across < radius - margin
             }
+            Self::Ball { center, radius } => point.distance(center) < radius - margin,
         }
     }
 
@@ -156,6 +140,7 @@ impl Primitive {
             Self::Cylinder {
                 radius, half_length, ..
             } => TAU * radius * (2.0 * half_length + radius),
+            Self::Ball { radius, .. } => 2.0 * TAU * radius * radius,
         }
     }
 
@@ -169,6 +154,7 @@ impl Primitive {
                 radius,
                 half_length,
             } => sample_cylinder(center, axis, radius, half_length, density),
+            Self::Ball { center, radius } => sample_ball(center, radius, density),
         }
     }
 }
@@ -215,6 +201,19 @@ fn sample_cylinder(center: DVec3, axis: DVec3, radius: f64, half_length: f64, de
         }
     }
     samples
+}
+
+fn sample_ball(center: DVec3, radius: f64, density: f64) -> Vec<Sample> {
+    let sample = |point: DVec2| {
+        let (sin, cos) = (TAU * point.x).sin_cos();
+        let z = 2.0 * point.y - 1.0;
+        let across = (1.0 - z * z).max(0.0).sqrt();
+        let normal = DVec3::new(across * cos, across * sin, z);
+        (center + radius * normal, normal)
+    };
+    even_points(2.0 * TAU * radius * radius * density, 0)
+        .map(sample)
+        .collect()
 }
 
 /// About `count` even points of the unit square; other ones for each `face`, so that opposite faces don't match.
