@@ -374,7 +374,7 @@ fn quiet_says_nothing_and_words_go_to_standard_error() {
     fs::write(folder.path().join("scan.ply"), ply_of(&sphere(1200))).unwrap();
     let told = run(&folder, "orient scan.ply -o out.ply").expect(0);
     assert!(told.out.is_empty());
-    told.expect_sentence(&["scan.ply", "1 200 points", "1 component", "out.ply"]);
+    told.expect_sentence(&["scan.ply", "1,200 points", "1 component", "out.ply"]);
     let quiet = run(&folder, "orient scan.ply -o out.ply --quiet").expect(0);
     assert!(quiet.out.is_empty() && quiet.err.is_empty(), "{}", quiet.err);
 }
@@ -477,7 +477,10 @@ fn check_refuses_files_of_other_points() {
     check("fewer.ply", &["199", "200", "fewer.ply", "same points"]);
     check("reordered.ply", &["point 10", "reordered.ply", "same order"]);
     check("bare.xyz", &["bare.xyz", "no normals"]);
-    check("missing.ply", &["missing.ply"]);
+    check(
+        "missing.ply",
+        &["error: missing.ply: there is no such file or folder: check the path\n"],
+    );
     check(".", &["."]);
 }
 

@@ -7,6 +7,7 @@ use std::sync::{Arc, OnceLock};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use normend_core::{Cancelled, Progress};
+use normend_io::{ReadError, WriteError};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
@@ -102,13 +103,29 @@ impl Drop for Bar {
     }
 }
 
-/// `1234567` as `1 234 567`.
+/// An error in one sentence, causes included.
+pub fn in_words(error: &anyhow::Error) -> String {
+    // The errors of files tell their causes themselves.
+    if error.is::<ReadError>() || error.is::<WriteError>() {
+        error.to_string()
+    } else {
+        format!("{error:#}")
+    }
+}
+
+/// `n` of something whose plural ends in s: `1 point`, `1,200 points`.
+pub fn counted(n: usize, singular: &str) -> String {
+    let ending = if n == 1 { "" } else { "s" };
+    format!("{} {singular}{ending}", thousands(n as u64))
+}
+
+/// `1234567` as `1,234,567`.
 pub fn thousands(number: u64) -> String {
     let digits = number.to_string();
     let mut grouped = String::with_capacity(digits.len() + digits.len() / 3);
     for (index, digit) in digits.chars().enumerate() {
         if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            grouped.push(' ');
+            grouped.push(',');
         }
         grouped.push(digit);
     }
@@ -126,8 +143,18 @@ mod tests {
         }
         check(0, "0");
         check(999, "999");
-        check(1000, "1 000");
-        check(123_456, "123 456");
-        check(u64::MAX, "18 446 744 073 709 551 615");
+        check(1000, "1,000");
+        check(123_456, "123,456");
+        check(u64::MAX, "18,446,744,073,709,551,615");
+    }
+
+    #[test]
+    fn counts_in_words() {
+        fn check(n: usize, expect: &str) {
+            assert_eq!(counted(n, "point"), expect);
+        }
+        check(0, "0 points");
+        check(1, "1 point");
+        check(1200, "1,200 points");
     }
 }

@@ -64,7 +64,7 @@ fn exit_code_of(error: &anyhow::Error) -> ExitCode {
         console::say("stopped; files that were not finished are as they were");
         return ExitCode::from(INTERRUPTED);
     }
-    console::say(&format!("error: {error:#}"));
+    console::say(&format!("error: {}", console::in_words(error)));
     ExitCode::FAILURE
 }
 

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::{Outcome, prepare, title_of};
 use crate::arguments::CheckArguments;
-use crate::console::{Bar, thousands};
+use crate::console::{Bar, counted, thousands};
 
 /// Positions that differ by more than this share of the diagonal are not the same points.
 const MAX_SHIFT: f64 = 1e-4;
@@ -55,13 +55,15 @@ pub fn run(arguments: &CheckArguments) -> anyhow::Result<Outcome> {
         &Part::new(&bar, 0.4..1.0),
     )?;
     drop(bar);
-    let mut out = io::stdout().lock();
-    if arguments.json {
-        print_json(&mut out, &comparison, result_normals.len(), arguments)?;
+    let text = if arguments.json {
+        in_json(&comparison, result_normals.len(), arguments)?
     } else {
-        print_words(&mut out, &comparison, result_normals.len())?;
-    }
-    out.flush()?;
+        in_words(&comparison, result_normals.len())
+    };
+    let mut out = io::stdout().lock();
+    out.write_all(text.as_bytes())
+        .and_then(|()| out.flush())
+        .context("cannot write to standard output")?;
     Ok(Outcome::Done)
 }
 
@@ -79,11 +81,11 @@ fn check_same_points(reference: &Scan, result: &Scan, arguments: &CheckArguments
     let (truth, cloud) = (&reference.cloud, &result.cloud);
     if truth.n_points() != cloud.n_points() {
         bail!(
-            "{} has {} points and {} has {}: check needs the same points in the same order",
+            "{} has {} and {} has {}: check needs the same points in the same order",
             arguments.result.display(),
-            thousands(cloud.n_points() as u64),
+            counted(cloud.n_points(), "point"),
             arguments.reference.display(),
-            thousands(truth.n_points() as u64)
+            counted(truth.n_points(), "point")
         );
     }
     let origin_shift = cloud.origin() - truth.origin();
@@ -103,12 +105,8 @@ fn check_same_points(reference: &Scan, result: &Scan, arguments: &CheckArguments
     Ok(())
 }
 
-fn print_json(
-    out: &mut impl Write,
-    comparison: &Comparison,
-    n_points: usize,
-    arguments: &CheckArguments,
-) -> anyhow::Result<()> {
+/// The counts as one line of JSON.
+fn in_json(comparison: &Comparison, n_points: usize, arguments: &CheckArguments) -> anyhow::Result<String> {
     let angle = comparison.mean_unsigned_angle;
     let report = Report {
         result: &arguments.result,
@@ -122,36 +120,35 @@ fn print_json(
         undefined: comparison.n_undefined,
         mean_unsigned_angle_degrees: (!angle.is_nan()).then(|| angle.to_degrees()),
     };
-    let line = serde_json::to_string(&report).context("cannot put the report into JSON")?;
-    writeln!(out, "{line}")?;
-    Ok(())
+    let mut line = serde_json::to_string(&report).context("cannot put the report into JSON")?;
+    line.push('\n');
+    Ok(line)
 }
 
-fn print_words(out: &mut impl Write, comparison: &Comparison, n_points: usize) -> io::Result<()> {
+/// The counts as aligned rows.
+fn in_words(comparison: &Comparison, n_points: usize) -> String {
     let n_judged = comparison.n_judged;
-    let percent = |n: usize| {
-        if n_judged == 0 {
+    let row = |label: &str, count: usize| format!("{label:<34}{:>12}", thousands(count as u64));
+    let wrong_row = |label: &str, n_wrong: usize| {
+        let share = if n_judged == 0 {
             0.0
         } else {
-            100.0 * n as f64 / n_judged as f64
-        }
+            n_wrong as f64 / n_judged as f64
+        };
+        format!("{}  {:.3} %", row(label, n_wrong), 100.0 * share)
     };
-    let mut row =
-        |label: &str, count: usize, rest: &str| writeln!(out, "{label:<32}{:>12}{rest}", thousands(count as u64));
-    row("points", n_points, "")?;
-    row("judged", n_judged, "")?;
-    for (label, n_wrong) in [
-        ("wrong", comparison.n_wrong),
-        ("wrong after the best global flip", comparison.n_wrong_global_flip),
-        ("wrong after component flips", comparison.n_wrong_component_flip),
-    ] {
-        row(label, n_wrong, &format!("  {:.3} %", percent(n_wrong)))?;
-    }
-    row("components", comparison.n_components, "")?;
-    row("without a normal", comparison.n_undefined, "")?;
+    let mut rows = vec![
+        row("points", n_points),
+        row("judged", n_judged),
+        wrong_row("wrong", comparison.n_wrong),
+        wrong_row("wrong after the best global flip", comparison.n_wrong_global_flip),
+        wrong_row("wrong after component flips", comparison.n_wrong_component_flip),
+        row("components", comparison.n_components),
+        row("without a normal", comparison.n_undefined),
+    ];
     if !comparison.mean_unsigned_angle.is_nan() {
         let degrees = comparison.mean_unsigned_angle.to_degrees();
-        writeln!(out, "{:<32}{degrees:>12.2}  degrees, sides aside", "mean angle")?;
+        rows.push(format!("{:<34}{degrees:>12.2}  degrees, sides aside", "mean angle"));
     }
-    Ok(())
+    rows.join("\n") + "\n"
 }

@@ -6,7 +6,7 @@ use normend_io::{Positions, write_points};
 
 use super::{Outcome, prepare, title_of, wrong_use};
 use crate::arguments::GenerateArguments;
-use crate::console::{Bar, thousands};
+use crate::console::{Bar, counted};
 
 /// Writes one shape: its positions, and with `--truth` its positions and normals.
 ///
@@ -29,9 +29,9 @@ pub fn run(arguments: &GenerateArguments) -> anyhow::Result<Outcome> {
     let positions = Positions::Float(&positions);
     write_points(&arguments.output, positions, None, &Part::new(&bar, 0.3..0.6))?;
     bar.say(&format!(
-        "{}: {} points",
+        "{}: {}",
         arguments.output.display(),
-        thousands(arguments.points as u64)
+        counted(arguments.points, "point")
     ));
     if let Some(truth) = &arguments.truth {
         write_points(truth, positions, Some(&normals), &Part::new(&bar, 0.6..1.0))?;

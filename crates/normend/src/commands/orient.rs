@@ -14,7 +14,7 @@ use serde::{Serialize, Serializer};
 
 use super::{Outcome, is_same_file, prepare, title_of, wrong_use};
 use crate::arguments::OrientArguments;
-use crate::console::{self, Bar, thousands};
+use crate::console::{self, Bar, counted};
 use crate::memory::peak_rss_bytes;
 
 /// What was typed, understood and found possible.
@@ -108,7 +108,7 @@ pub fn run(arguments: OrientArguments) -> anyhow::Result<Outcome> {
             Err(error) if console::is_stopped() => return Err(error),
             Err(error) => {
                 outcome = Outcome::Failed;
-                let error = format!("{error:#}");
+                let error = console::in_words(&error);
                 bar.say_error(&format!("error: {error}"));
                 Report::Failed {
                     input: &job.input,
@@ -271,19 +271,13 @@ fn sentence(oriented: &Oriented) -> String {
     let total = oriented.seconds.0.last().map_or(0.0, |&(_, secs)| secs);
     let left_out = match oriented.left_out {
         0 => String::new(),
-        1 => " (1 row without finite coordinates left out)".to_owned(),
-        n => format!(" ({} rows without finite coordinates left out)", thousands(n as u64)),
+        n => format!(" ({} without finite coordinates left out)", counted(n, "row")),
     };
     format!(
-        "{}: {} points{left_out}, {} {}, {total:.1} s → {}",
+        "{}: {}{left_out}, {}, {total:.1} s → {}",
         oriented.input.display(),
-        thousands(oriented.points as u64),
-        thousands(oriented.components as u64),
-        if oriented.components == 1 {
-            "component"
-        } else {
-            "components"
-        },
+        counted(oriented.points, "point"),
+        counted(oriented.components, "component"),
         oriented.output.display()
     )
 }
