@@ -78,7 +78,11 @@ impl App {
     /// Does what was asked for.
     pub fn act(&mut self, action: Action) {
         match action {
-            Action::Run(command) => self.run(command),
+            Action::Run(command) => match self.availability(command) {
+                Ok(()) => self.run(command),
+                // A key that does nothing now says why.
+                Err(reason) => self.messages.info(format!("{}: {reason}.", command.label())),
+            },
             Action::OpenScan(path) => self.leave(Leaving::Open(ScanOrigin::File(path))),
             Action::ClearRecent => self.settings.settings.recent.clear(),
             Action::Propagate(parameters) => {
@@ -109,7 +113,11 @@ impl App {
                 }
             }
             Action::ExportTo { path, overwrite_input } => {
-                let Some(session) = &self.session else { return };
+                let Some(session) = self.session.as_ref().filter(|_| self.work.is_none()) else {
+                    self.messages
+                        .error("Nothing was exported: other work is running. Wait for it, or cancel it.");
+                    return;
+                };
                 // A relative path means the folder that the editor was started in; the message names it in full.
                 let path = std::path::absolute(&path).unwrap_or(path);
                 self.work = Work::export(&self.ctx, session, &path, overwrite_input);

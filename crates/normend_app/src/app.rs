@@ -13,7 +13,7 @@ use crate::messages::Messages;
 use crate::panels::export::{self, ExportWindow};
 use crate::panels::open_path::{self, OpenPathWindow};
 use crate::panels::{about, empty, menu_bar, messages, progress, shortcuts, side, status_bar, unsaved};
-use crate::scene_sync::Scene;
+use crate::scene_sync::{Scene, Target};
 use crate::session::Session;
 use crate::settings::SettingsStore;
 use crate::theme;
@@ -227,11 +227,7 @@ impl App {
         let focused = self.ctx.memory(|memory| memory.focused());
         let widget_focused = focused.is_some() && focused != self.viewport.id();
         for command in take_shortcuts(&self.ctx, typing, widget_focused) {
-            // A shortcut that does not apply now says why instead of nothing.
-            match self.availability(command) {
-                Ok(()) => self.act(command.into()),
-                Err(reason) => self.messages.info(format!("{}: {reason}.", command.label())),
-            }
+            self.act(command.into());
         }
     }
 
@@ -333,10 +329,26 @@ impl App {
         if self.mend.is_picking() {
             ui.request_repaint();
         }
-        if let (Some(position), Some(n_points)) = (pointer.position, self.mend.n_would_turn()) {
-            let text = format!("Turns {}", theme::counted(n_points, "point", "points"));
+        if let (Some(position), Some(text)) = (pointer.position, self.badge_text()) {
             self.viewport.badge(ui, position, &text);
         }
+    }
+
+    /// What a click at the pointer would do.
+    fn badge_text(&self) -> Option<String> {
+        if let Some(n_points) = self.mend.n_would_turn() {
+            return Some(format!("Turns {}", theme::counted(n_points, "point", "points")));
+        }
+        let session = self.session.as_ref()?;
+        let Some(Target::Source { point, .. }) = self.mend.target() else {
+            return None;
+        };
+        let source = session.document.sources().get(point)?;
+        let state = if session.is_flipped(source) { "flipped" } else { "kept" };
+        Some(format!(
+            "Source at point {}, {state}",
+            theme::thousands(u64::from(point))
+        ))
     }
 
     /// The first click of a double-click mended something; the user meant the pivot.
@@ -418,9 +430,11 @@ impl App {
             match unsaved::ui(ui, name) {
                 unsaved::Decision::Wait => {}
                 unsaved::Decision::Export => {
-                    self.windows.unsaved = None;
                     self.act(Command::Export.into());
-                    self.after_export = Some(leaving);
+                    if self.windows.export.is_some() {
+                        self.windows.unsaved = None;
+                        self.after_export = Some(leaving);
+                    }
                 }
                 unsaved::Decision::Discard => {
                     self.windows.unsaved = None;

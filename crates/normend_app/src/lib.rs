@@ -11,6 +11,7 @@ pub mod command;
 mod dialogs;
 pub mod job;
 pub mod messages;
+mod pace;
 pub mod panels;
 mod run;
 pub mod scene_sync;

@@ -98,7 +98,7 @@ fn in_words(error: &str) -> String {
         "neither WAYLAND_DISPLAY nor",
         "could not open display",
         "Failed to open connection to X server",
-    ]) || has(&["XOpenDisplayFailed", "NoCompositor", "BadDisplay"])
+    ]) || has(&["XOpenDisplayFailed", "NoCompositor", "BadDisplay", "wayland compositor"])
     {
         "The editor needs a display, and there is none: DISPLAY and WAYLAND_DISPLAY name no running desktop. \
          Start it from a desktop session; `normend orient` and `normend render` work without a display."

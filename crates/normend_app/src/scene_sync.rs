@@ -4,11 +4,12 @@
 //! ranges of a [`Change`] are the ranges that the renderer turns. Source spheres follow the document's sources.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use eframe::egui_wgpu::RenderState;
 use egui::TextureId;
 use glam::Vec3;
-use normend_core::{Change, PointCloud};
+use normend_core::{Change, PointCloud, SpanningTree};
 use normend_render::{Camera, DrawSettings, Hit, PickRequest, RenderError, Sphere, SplatRenderer, wgpu};
 
 use crate::session::Session;
@@ -57,8 +58,8 @@ pub struct Scene {
     renderer: SplatRenderer,
     state: RenderState,
     texture: Option<(TextureId, u64)>,
-    /// Points by instance; empty while instances are points.
-    points: Vec<u32>,
+    /// Gives the point of an instance; `None` while instances are points.
+    tree: Option<Arc<SpanningTree>>,
     /// Points of the source spheres, in the renderer's order.
     source_points: Vec<u32>,
     geometry: Option<Geometry>,
@@ -75,7 +76,7 @@ impl Scene {
             renderer: SplatRenderer::new(&state.device),
             state,
             texture: None,
-            points: Vec::new(),
+            tree: None,
             source_points: Vec::new(),
             geometry: None,
             picture_id: 0,
@@ -118,7 +119,7 @@ impl Scene {
             return Ok(());
         };
         self.forget_ids();
-        self.points = propagation.tree.order().to_vec();
+        let tree = Arc::clone(&propagation.tree);
         let (device, queue) = (&self.state.device, &self.state.queue);
         let positions = document.cloud().positions();
         self.renderer.set_highlight(device, queue, &[]);
@@ -128,8 +129,9 @@ impl Scene {
             positions,
             Some(&propagation.normals),
             &propagation.splat_radii,
-            Some(&self.points),
+            Some(tree.order()),
         )?;
+        self.tree = Some(tree);
         self.renderer.set_turned(queue, &orientation.to_words());
         self.show_sources(session);
         Ok(())
@@ -184,7 +186,7 @@ impl Scene {
     }
 
     fn forget_ids(&mut self) {
-        self.points.clear();
+        self.tree = None;
         self.source_points.clear();
         self.picture_id += 1;
         self.ids_version += 1;
@@ -264,10 +266,9 @@ impl Scene {
                 instance,
                 point: position,
             } => {
-                let point = if self.points.is_empty() {
-                    Some(instance)
-                } else {
-                    self.points.get(instance as usize).copied()
+                let point = match &self.tree {
+                    Some(tree) => tree.order().get(instance as usize).copied(),
+                    None => Some(instance),
                 };
                 point.map(|point| Target::Point { point, position })
             }

@@ -5,6 +5,7 @@ use glam::Vec3;
 use normend_core::PointCloud;
 use normend_render::{Camera, DrawSettings, Projection, StandardView};
 
+use crate::pace::Pace;
 use crate::scene_sync::Scene;
 
 /// A pixel of the view, physical, from its top left corner.
@@ -22,8 +23,7 @@ pub struct Viewport {
     id: Option<egui::Id>,
     /// The point that zooming keeps in place, for as long as the pointer rests.
     zoom_anchor: Option<(Pos2, Vec3)>,
-    last_moved: f64,
-    stride: u32,
+    pace: Pace,
 }
 
 /// What the pointer did in the view this frame.
@@ -43,13 +43,6 @@ pub struct PointerOnView {
     pub by_double_click: bool,
 }
 
-/// After this rest, in seconds, everything is drawn again.
-const SETTLE_SECS: f64 = 0.15;
-/// While moving, fewer splats are drawn until a frame takes about this long.
-const SLOW_FRAME_SECS: f32 = 0.060;
-const FAST_FRAME_SECS: f32 = 0.022;
-const MAX_STRIDE: u32 = 64;
-
 impl Viewport {
     /// Looks at an empty scene.
     pub fn new() -> Self {
@@ -60,8 +53,7 @@ impl Viewport {
             pixels_per_point: 1.0,
             id: None,
             zoom_anchor: None,
-            last_moved: f64::NEG_INFINITY,
-            stride: 1,
+            pace: Pace::new(),
         }
     }
 
@@ -163,10 +155,12 @@ impl Viewport {
 
         let before = self.camera;
         self.move_camera(ui, &response, settings, under_pointer);
-        let now = ui.input(|input| input.time);
+        let (now, frame_secs) = ui.input(|input| (input.time, input.unstable_dt));
         let moved = self.camera != before;
-        self.choose_stride(ui, moved, now);
-        settings.stride = self.stride;
+        if let Some(secs) = self.pace.frame(moved, response.dragged(), now, frame_secs) {
+            ui.request_repaint_after(std::time::Duration::from_secs_f64(secs));
+        }
+        settings.stride = self.pace.stride();
 
         if let Some(texture) = scene.draw(&self.camera, self.size, self.pixels_per_point, settings) {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
@@ -178,7 +172,7 @@ impl Viewport {
         self.axis_gizmo(ui);
 
         let position = response.hover_pos();
-        let resting = !moved && !response.dragged() && self.stride == 1;
+        let resting = !moved && !response.dragged() && self.pace.stride() == 1;
         let clicked_at = response
             .interact_pointer_pos()
             .and_then(|position| self.pixel(position));
@@ -239,29 +233,6 @@ impl Viewport {
         let pixel = (pointer - self.rect.min) * self.pixels_per_point;
         self.camera
             .zoom(factor, glam::Vec2::new(pixel.x, pixel.y), self.size_in_pixels(), anchor);
-    }
-
-    /// Fewer splats while the camera moves and frames are slow; all of them once it rests.
-    fn choose_stride(&mut self, ui: &Ui, moved: bool, now: f64) {
-        if moved {
-            let frame_secs = ui.input(|input| input.unstable_dt);
-            // The time of a frame after a rest says nothing: it is the rest's.
-            if now - self.last_moved < SETTLE_SECS.max(f64::from(frame_secs) * 1.5) {
-                if frame_secs > SLOW_FRAME_SECS {
-                    self.stride = (self.stride * 2).min(MAX_STRIDE);
-                } else if frame_secs < FAST_FRAME_SECS {
-                    self.stride = (self.stride / 2).max(1);
-                }
-            }
-            self.last_moved = now;
-        }
-        if self.stride > 1 {
-            let left = self.last_moved + SETTLE_SECS - now;
-            if left <= 0.0 {
-                self.stride = 1;
-            }
-            ui.request_repaint_after(std::time::Duration::from_secs_f64(left.max(0.0)));
-        }
     }
 
     fn pivot_mark(&self, ui: &Ui) {

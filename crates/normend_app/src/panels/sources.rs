@@ -81,7 +81,7 @@ fn row(ui: &mut Ui, point: u32, flipped: bool, origin: Origin, selected: bool) -
     let state = if flipped { "flipped" } else { "kept" };
     let text = format!("      Point {}", theme::thousands(u64::from(point)));
     let button = Button::selectable(selected, text)
-        .shortcut_text(format!("{state}, {}", origin.label()))
+        .shortcut_text(format!("{state}, {}", origin.label().to_lowercase()))
         .min_size(Vec2::new(ui.available_width(), ROW_HEIGHT));
     let response = ui
         .add(button)
