@@ -135,6 +135,10 @@ fn lines_that_do_not_belong_into_a_header() {
 #[test]
 fn vertices_that_are_no_points() {
     check(
+        b"ply\nformat ascii 1.0\nend_header\n",
+        ": the header declares no element \"vertex\": export the file again",
+    );
+    check(
         b"ply\nformat ascii 1.0\nelement face 0\nelement edge 0\nend_header\n",
         ": there is no element \"vertex\" (only \"face, edge\"): rename the one that holds the points",
     );

@@ -100,6 +100,11 @@ pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<PlyLayout, S
 fn find_vertex(header: &Header) -> Result<usize, Broken> {
     let Some(vertex) = header.elements.iter().position(|element| element.name == "vertex") else {
         let names: Vec<&str> = header.elements.iter().map(|element| element.name.as_str()).collect();
+        if names.is_empty() {
+            return Err(Broken::whole(
+                "the header declares no element \"vertex\": export the file again",
+            ));
+        }
         return Err(Broken::whole(format!(
             "there is no element \"vertex\" (only {}): rename the one that holds the points",
             quoted(names.join(", ").as_bytes())
