@@ -331,7 +331,7 @@ fn a_wrong_patch_is_mended_in_the_window() {
     expect_orange("the patch after undo", patch, |share| share > 0.9);
     display.xdotool(&["key", "ctrl+shift+z"]);
     expect_orange("the patch after redo", patch, |share| share < 0.3);
-    // The first source of a component turns all of it; the next ones divide it until all that is seen is right.
+    // Whatever else is seen wrong, as users do.
     for _ in 0..MOST_CLICKS {
         display.wait_for_rest();
         match display.shot().middle_of_orange() {
