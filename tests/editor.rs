@@ -2,219 +2,22 @@
 //!
 //! Without a graphics adapter the tests say that they are skipped; with `NORMEND_REQUIRE_GPU=1` they fail instead.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests fail as tests do, by panicking")]
+
+#[path = "editor/driver.rs"]
+mod driver;
+
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Duration;
 
-use eframe::egui_wgpu::WgpuSetup;
 use egui::accesskit::Role;
-use egui::{Key, Modifiers, Pos2, Vec2};
-use egui_kittest::Harness;
+use egui::{Key, Modifiers, Vec2};
 use egui_kittest::kittest::Queryable;
-use glam::Vec3;
 use normend_app::command::Command;
 use normend_app::messages::Level;
-use normend_app::{App, SettingsStore, graphics_setup};
 use normend_core::{Silent, Start, shapes};
-use normend_io::Positions;
-use normend_render::HeadlessDevice;
 
-/// The editor with its settings and its scans in a folder of its own.
-struct Editor {
-    harness: Harness<'static, App>,
-    folder: tempfile::TempDir,
-}
-
-/// Starts the editor on `scan`; `None` when there is no graphics adapter and none is required.
-fn start(scan: impl FnOnce(&Path) -> Option<PathBuf>) -> Option<Editor> {
-    if let Err(error) = HeadlessDevice::new() {
-        let required = std::env::var_os("NORMEND_REQUIRE_GPU").is_some_and(|value| value == "1");
-        assert!(!required, "NORMEND_REQUIRE_GPU=1, but {error}");
-        println!("skipped: {error}");
-        return None;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let scan = scan(folder.path());
-    let (settings, problem) = SettingsStore::load_from(&folder.path().join("settings"));
-    let harness = Harness::builder()
-        .with_size(Vec2::new(1000.0, 700.0))
-        .with_step_dt(1.0 / 60.0)
-        .wgpu_setup(WgpuSetup::CreateNew(graphics_setup()))
-        .build_eframe(move |cc| App::with_settings(cc, scan, settings, problem));
-    Some(Editor { harness, folder })
-}
-
-impl Editor {
-    fn app(&self) -> &App {
-        self.harness.state()
-    }
-
-    /// Steps until `holds`; jobs and picks end in their own time.
-    fn wait(&mut self, what: &str, holds: impl Fn(&App) -> bool) {
-        for _ in 0..6000 {
-            if holds(self.app()) {
-                return;
-            }
-            self.harness.step();
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        panic!("never came: {what}; messages: {:?}", self.app().messages().entries());
-    }
-
-    fn wait_until_oriented(&mut self) {
-        self.wait("an oriented document", |app| {
-            !app.is_busy() && app.document().is_some_and(|document| document.orientation().is_some())
-        });
-        self.harness.run_steps(3);
-    }
-
-    fn key(&mut self, modifiers: Modifiers, key: Key) {
-        self.harness.key_press_modifiers(modifiers, key);
-        self.harness.run_steps(2);
-    }
-
-    fn click_button(&mut self, label: &str) {
-        self.harness.get_by_role_and_label(Role::Button, label).click();
-        self.harness.run_steps(2);
-    }
-
-    fn shows(&self, label: &str) -> bool {
-        self.harness.query_all_by_label_contains(label).next().is_some()
-    }
-
-    fn hover(&mut self, place: Pos2) {
-        self.harness.hover_at(place);
-        self.harness.run_steps(2);
-    }
-
-    fn click(&mut self, place: Pos2) {
-        self.harness.hover_at(place);
-        self.harness.drag_at(place);
-        self.harness.event(egui::Event::PointerButton {
-            pos: place,
-            button: egui::PointerButton::Primary,
-            pressed: false,
-            modifiers: Modifiers::NONE,
-        });
-        self.harness.run_steps(2);
-    }
-
-    fn picture(&self) -> Picture {
-        let ([width, height], rgba) = self.app().picture().unwrap();
-        Picture {
-            width: width as usize,
-            height: height as usize,
-            rgba,
-        }
-    }
-
-    /// The place in the window of a pixel of the view; one point is one pixel here.
-    fn place(&self, pixel: (usize, usize)) -> Pos2 {
-        self.app().view_rect().min + Vec2::new(pixel.0 as f32 + 0.5, pixel.1 as f32 + 0.5)
-    }
-
-    fn bits(&self) -> Vec<u32> {
-        self.app().document().unwrap().orientation().unwrap().to_words()
-    }
-
-    fn normals(&self) -> Vec<Vec3> {
-        self.app().document().unwrap().oriented_normals().unwrap()
-    }
-
-    fn n_sources(&self) -> usize {
-        self.app().document().unwrap().sources().len()
-    }
-
-    fn said(&self, words: &str) -> bool {
-        self.app()
-            .messages()
-            .entries()
-            .iter()
-            .any(|entry| entry.text.contains(words))
-    }
-
-    /// Moves the pointer over the middle of the wrong patch and waits for the preview.
-    fn hover_wrong_patch(&mut self) -> (Pos2, u64) {
-        let pixel = self.picture().inside(is_back).expect("no patch faces backward");
-        let place = self.place(pixel);
-        self.hover(place);
-        self.wait("a preview", |app| app.n_would_turn().is_some());
-        (place, self.app().n_would_turn().unwrap())
-    }
-}
-
-struct Picture {
-    width: usize,
-    height: usize,
-    rgba: Vec<u8>,
-}
-
-impl Picture {
-    fn at(&self, x: usize, y: usize) -> [u8; 3] {
-        let start = 4 * (y * self.width + x);
-        [self.rgba[start], self.rgba[start + 1], self.rgba[start + 2]]
-    }
-
-    fn count(&self, is: fn([u8; 3]) -> bool) -> usize {
-        (0..self.height)
-            .flat_map(|y| (0..self.width).map(move |x| (x, y)))
-            .filter(|&(x, y)| is(self.at(x, y)))
-            .count()
-    }
-
-    /// A pixel whose surroundings are also such, as far from the border of the patch as possible.
-    fn inside(&self, is: fn([u8; 3]) -> bool) -> Option<(usize, usize)> {
-        [12_usize, 8, 5, 3, 1].into_iter().find_map(|reach| {
-            (reach..self.height - reach)
-                .flat_map(|y| (reach..self.width - reach).map(move |x| (x, y)))
-                .find(|&(x, y)| (y - reach..=y + reach).all(|y| (x - reach..=x + reach).all(|x| is(self.at(x, y)))))
-        })
-    }
-}
-
-/// Orange, in any light.
-fn is_back([red, _, blue]: [u8; 3]) -> bool {
-    i32::from(red) > i32::from(blue) + 40
-}
-
-/// Blue, in any light.
-fn is_front([red, _, blue]: [u8; 3]) -> bool {
-    i32::from(blue) > i32::from(red) + 40
-}
-
-const N_POINTS: usize = 4000;
-
-/// A sphere whose normals are right but for a cap that faces the corner view.
-fn sphere_with_wrong_cap(folder: &Path) -> Option<PathBuf> {
-    let shape = shapes::sphere(N_POINTS);
-    let toward_view = Vec3::new(1.0, -1.0, 1.0) / 3.0_f32.sqrt();
-    let normals: Vec<Vec3> = shape
-        .normals
-        .iter()
-        .map(|&normal| if normal.dot(toward_view) > 0.8 { -normal } else { normal })
-        .collect();
-    let path = folder.join("sphere.ply");
-    normend_io::write_points(&path, Positions::Float(&shape.positions), Some(&normals), &Silent).unwrap();
-    Some(path)
-}
-
-fn sphere_without_normals(folder: &Path, name: &str, n_points: usize) -> PathBuf {
-    let path = folder.join(name);
-    normend_io::write_points(
-        &path,
-        Positions::Float(&shapes::sphere(n_points).positions),
-        None,
-        &Silent,
-    )
-    .unwrap();
-    path
-}
-
-fn n_different(a: &[Vec3], b: &[Vec3]) -> u64 {
-    assert_eq!(a.len(), b.len());
-    a.iter().zip(b).filter(|(a, b)| a != b).count() as u64
-}
+use driver::{N_POINTS, is_back, is_front, n_different, sphere_with_wrong_cap, sphere_without_normals, start};
 
 #[test]
 fn the_empty_state_invites_and_every_widget_has_a_name() {
@@ -282,7 +85,7 @@ fn a_wrong_patch_is_mended_undone_redone_and_exported() {
     // The exported file has the normals of the document.
     let target = editor.folder.path().join("out dir").join("mended.ply");
     fs::create_dir(target.parent().unwrap()).unwrap();
-    export_to(&mut editor, &target);
+    editor.export_to(&target);
     editor.wait("an exported file", |app| !app.is_busy());
     assert!(
         editor.said("Exported 4,000 points"),
@@ -294,26 +97,6 @@ fn a_wrong_patch_is_mended_undone_redone_and_exported() {
     assert!(!editor.app().is_unsaved());
 }
 
-/// Exports through the window: opens it, types the path, presses the button.
-fn export_to(editor: &mut Editor, target: &Path) {
-    editor.key(Modifiers::COMMAND, Key::E);
-    let field = editor.harness.get_by_role_and_label(Role::TextInput, "Export to");
-    assert!(
-        field.value().unwrap().ends_with("sphere_oriented.ply"),
-        "{:?}",
-        field.value()
-    );
-    field.focus();
-    editor.harness.run_steps(1);
-    editor.key(Modifiers::COMMAND, Key::A);
-    editor
-        .harness
-        .get_by_role_and_label(Role::TextInput, "Export to")
-        .type_text(&target.display().to_string());
-    editor.harness.run_steps(2);
-    editor.click_button("Export");
-}
-
 #[test]
 fn the_opened_file_is_replaced_only_after_a_second_word() {
     let Some(mut editor) = start(sphere_with_wrong_cap) else {
@@ -322,7 +105,7 @@ fn the_opened_file_is_replaced_only_after_a_second_word() {
     editor.wait_until_oriented();
     let input = editor.folder.path().join("sphere.ply");
     let before = fs::read(&input).unwrap();
-    export_to(&mut editor, &input);
+    editor.export_to(&input);
     editor.harness.run_steps(5);
     assert!(!editor.app().is_busy());
     assert_eq!(fs::read(&input).unwrap(), before);
@@ -467,25 +250,25 @@ fn closing_asks_about_unsaved_mends() {
     };
     editor.wait_until_oriented();
     assert!(
-        !close(&mut editor).contains(&egui::ViewportCommand::CancelClose),
+        !editor.close().contains(&egui::ViewportCommand::CancelClose),
         "nothing was mended yet"
     );
 
     let (place, _) = editor.hover_wrong_patch();
     editor.click(place);
     editor.wait("a source", |app| app.document().unwrap().sources().len() == 1);
-    assert!(close(&mut editor).contains(&egui::ViewportCommand::CancelClose));
+    assert!(editor.close().contains(&egui::ViewportCommand::CancelClose));
     editor.harness.run_steps(2);
     assert!(editor.shows("Unsaved mends"));
     editor.click_button("Cancel");
     assert!(!editor.shows("Unsaved mends"));
 
-    close(&mut editor);
+    editor.close();
     editor.harness.run_steps(2);
     editor.harness.get_by_role_and_label(Role::Button, "Discard").click();
-    let commands = commands_of(&mut editor, 3);
+    let commands = editor.commands_of(3);
     assert!(commands.contains(&egui::ViewportCommand::Close), "{commands:?}");
-    assert!(!close(&mut editor).contains(&egui::ViewportCommand::CancelClose));
+    assert!(!editor.close().contains(&egui::ViewportCommand::CancelClose));
 }
 
 #[test]
@@ -497,10 +280,9 @@ fn exporting_from_the_question_goes_on_to_close() {
     let (place, _) = editor.hover_wrong_patch();
     editor.click(place);
     editor.wait("a source", |app| app.document().unwrap().sources().len() == 1);
-    close(&mut editor);
+    editor.close();
     editor.harness.run_steps(2);
-    let question = editor.harness.get_by_label_contains("are in no exported file yet");
-    assert!(question.value().is_some() || !format!("{question:?}").is_empty());
+    assert!(editor.shows("are in no exported file yet"));
     // The toolbar has a button of the same name; the question's comes last.
     editor
         .harness
@@ -512,7 +294,7 @@ fn exporting_from_the_question_goes_on_to_close() {
     editor.click_button("Export");
     let mut commands = Vec::new();
     for _ in 0..2000 {
-        commands.extend(commands_of(&mut editor, 1));
+        commands.extend(editor.commands_of(1));
         if commands.contains(&egui::ViewportCommand::Close) {
             break;
         }
@@ -524,56 +306,6 @@ fn exporting_from_the_question_goes_on_to_close() {
         editor.app().messages().entries()
     );
     assert!(editor.folder.path().join("sphere_oriented.ply").exists());
-}
-
-/// Asks the window to close as a desktop does, and returns the commands of the frame that hears of it.
-fn close(editor: &mut Editor) -> Vec<egui::ViewportCommand> {
-    let input = editor.harness.input_mut();
-    input
-        .viewports
-        .entry(egui::ViewportId::ROOT)
-        .or_default()
-        .events
-        .push(egui::ViewportEvent::Close);
-    let commands = commands_of(editor, 1);
-    if let Some(info) = editor.harness.input_mut().viewports.get_mut(&egui::ViewportId::ROOT) {
-        info.events.clear();
-    }
-    commands
-}
-
-fn commands_of(editor: &mut Editor, n_steps: usize) -> Vec<egui::ViewportCommand> {
-    (0..n_steps)
-        .flat_map(|_| {
-            editor.harness.step();
-            editor.harness.output().viewport_output[&egui::ViewportId::ROOT]
-                .commands
-                .clone()
-        })
-        .collect()
-}
-
-#[derive(Debug)]
-struct Dropped(PathBuf);
-
-impl egui::DroppedFile for Dropped {
-    fn path(&self) -> &Path {
-        &self.0
-    }
-
-    fn bytes(&self) -> Result<Vec<u8>, String> {
-        fs::read(&self.0).map_err(|error| error.to_string())
-    }
-}
-
-impl Editor {
-    fn drop_file(&mut self, path: &Path) {
-        self.harness
-            .input_mut()
-            .dropped_files
-            .push(Arc::new(Dropped(path.to_path_buf())));
-        self.harness.step();
-    }
 }
 
 #[test]
@@ -711,4 +443,38 @@ fn display_keys_change_the_picture() {
         assert_ne!(after.rgba, before.rgba, "{key:?} changes nothing");
         before = after;
     }
+}
+
+#[test]
+fn a_whole_region_turns_on_request() {
+    let Some(mut editor) = start(|folder| Some(sphere_without_normals(folder, "bare.ply", 2000))) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let before = editor.normals();
+    let place = editor.app().view_rect().center();
+    editor.hover(place);
+    editor.wait("a preview", |app| app.n_would_turn().is_some());
+    assert!(
+        editor.app().n_would_turn().unwrap() < 2000,
+        "a mend turns a part of the sphere"
+    );
+    editor.key(Modifiers::SHIFT, Key::Enter);
+    editor.wait("a source", |app| !app.document().unwrap().sources().is_empty());
+    assert_eq!(n_different(&before, &editor.normals()), 2000);
+}
+
+#[test]
+fn a_typed_path_is_opened() {
+    let Some(mut editor) = start(|_| None) else { return };
+    let path = sphere_without_normals(editor.folder.path(), "typed.ply", 400);
+    editor.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::O);
+    let field = editor
+        .harness
+        .get_by_role_and_label(Role::TextInput, "Path of the scan");
+    field.type_text(&path.display().to_string());
+    editor.harness.run_steps(2);
+    editor.key(Modifiers::NONE, Key::Enter);
+    editor.wait_until_oriented();
+    assert_eq!(editor.app().document().unwrap().cloud().n_points(), 400);
 }
