@@ -17,7 +17,9 @@ use normend_app::command::Command;
 use normend_app::messages::Level;
 use normend_core::{Silent, Start, shapes};
 
-use driver::{N_POINTS, is_back, is_front, n_different, sphere_with_wrong_cap, sphere_without_normals, start};
+use driver::{
+    N_POINTS, is_back, is_front, n_different, sphere_with_wrong_cap, sphere_without_normals, start, start_scaled,
+};
 
 #[test]
 fn the_empty_state_invites_and_every_widget_has_a_name() {
@@ -477,4 +479,28 @@ fn a_typed_path_is_opened() {
     editor.key(Modifiers::NONE, Key::Enter);
     editor.wait_until_oriented();
     assert_eq!(editor.app().document().unwrap().cloud().n_points(), 400);
+}
+
+#[test]
+fn pixels_and_points_are_told_apart() {
+    let Some(mut editor) = start_scaled(1.5, sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let (view, picture) = (editor.app().view_rect(), editor.picture());
+    assert!(
+        (view.width() * 1.5 - picture.width as f32).abs() < 0.01,
+        "{view:?}, {} pixels",
+        picture.width
+    );
+    let before = editor.normals();
+    let truth = shapes::sphere(N_POINTS).normals;
+    let (place, n_would_turn) = editor.hover_wrong_patch();
+    editor.click(place);
+    editor.wait("a source", |app| app.document().unwrap().sources().len() == 1);
+    // Had the click gone elsewhere, right normals would have turned.
+    assert_eq!(
+        n_different(&editor.normals(), &truth) + n_would_turn,
+        n_different(&before, &truth)
+    );
 }

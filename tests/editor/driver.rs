@@ -24,6 +24,11 @@ pub struct Editor {
 
 /// Starts the editor on `scan`; `None` when there is no graphics adapter and none is required.
 pub fn start(scan: impl FnOnce(&Path) -> Option<PathBuf>) -> Option<Editor> {
+    start_scaled(1.0, scan)
+}
+
+/// As [`start`], on a screen with this many pixels a point.
+pub fn start_scaled(pixels_per_point: f32, scan: impl FnOnce(&Path) -> Option<PathBuf>) -> Option<Editor> {
     if let Err(error) = HeadlessDevice::new() {
         let required = std::env::var_os("NORMEND_REQUIRE_GPU").is_some_and(|value| value == "1");
         assert!(!required, "NORMEND_REQUIRE_GPU=1, but {error}");
@@ -36,6 +41,7 @@ pub fn start(scan: impl FnOnce(&Path) -> Option<PathBuf>) -> Option<Editor> {
     let harness = Harness::builder()
         .with_size(Vec2::new(1000.0, 700.0))
         .with_step_dt(1.0 / 60.0)
+        .with_pixels_per_point(pixels_per_point)
         .wgpu_setup(WgpuSetup::CreateNew(graphics_setup()))
         .build_eframe(move |cc| App::with_settings(cc, scan, settings, problem));
     Some(Editor { harness, folder })
@@ -105,9 +111,10 @@ impl Editor {
         }
     }
 
-    /// The place in the window of a pixel of the view; one point is one pixel here.
+    /// The place in the window of a pixel of the view.
     pub fn place(&self, pixel: (usize, usize)) -> Pos2 {
-        self.app().view_rect().min + Vec2::new(pixel.0 as f32 + 0.5, pixel.1 as f32 + 0.5)
+        let offset = Vec2::new(pixel.0 as f32 + 0.5, pixel.1 as f32 + 0.5);
+        self.app().view_rect().min + offset / self.harness.ctx.pixels_per_point()
     }
 
     pub fn bits(&self) -> Vec<u32> {
@@ -195,7 +202,7 @@ impl Editor {
 }
 
 pub struct Picture {
-    width: usize,
+    pub width: usize,
     height: usize,
     pub rgba: Vec<u8>,
 }
