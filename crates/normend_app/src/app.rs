@@ -344,7 +344,11 @@ impl App {
             return None;
         };
         let source = session.document.sources().get(point)?;
-        let state = if session.is_flipped(source) { "flipped" } else { "kept" };
+        let state = if session.document.is_flipped(source) {
+            "flipped"
+        } else {
+            "kept"
+        };
         Some(format!(
             "Source at point {}, {state}",
             theme::thousands(u64::from(point))
@@ -390,7 +394,9 @@ impl App {
         {
             work.cancel();
         }
-        messages::toasts(ui, area, &mut self.messages);
+        if !self.windows.log {
+            messages::toasts(ui, area, &mut self.messages);
+        }
         if ui.input(|input| !input.raw.hovered_files.is_empty()) {
             let painter = ui
                 .ctx()

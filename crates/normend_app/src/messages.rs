@@ -3,9 +3,9 @@
 /// How important a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
-    /// Something was done. Goes away by itself.
+    /// Something was done.
     Info,
-    /// Something failed. Stays until it is closed.
+    /// Something failed. Stays longer.
     Error,
 }
 
@@ -30,21 +30,22 @@ pub struct Messages {
 }
 
 const MAX_ENTRIES: usize = 300;
-const SHOWN_SECS: f64 = 7.0;
+const INFO_SECS: f64 = 7.0;
+const ERROR_SECS: f64 = 30.0;
 
 impl Messages {
     /// Says that something was done.
     pub fn info(&mut self, text: impl Into<String>) {
         let text = text.into();
         tracing::info!("{text}");
-        self.push(Level::Info, text, self.now + SHOWN_SECS);
+        self.push(Level::Info, text, self.now + INFO_SECS);
     }
 
     /// Says what failed and what to do.
     pub fn error(&mut self, text: impl Into<String>) {
         let text = text.into();
         tracing::error!("{text}");
-        self.push(Level::Error, text, f64::INFINITY);
+        self.push(Level::Error, text, self.now + ERROR_SECS);
     }
 
     fn push(&mut self, level: Level, text: String, shown_until: f64) {
@@ -79,7 +80,6 @@ impl Messages {
         self.entries
             .iter()
             .filter_map(|entry| entry.shown_until)
-            .filter(|until| until.is_finite())
             .map(|until| until - now)
             .reduce(f64::min)
     }
@@ -99,18 +99,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn information_leaves_and_errors_stay() {
+    fn messages_leave_the_view_and_errors_stay_longer() {
         let mut messages = Messages::default();
         messages.info("Opened.");
         messages.error("Failed.");
-        assert_eq!(messages.tick(1.0), Some(SHOWN_SECS - 1.0));
-        assert_eq!(messages.tick(SHOWN_SECS), None);
+        assert_eq!(messages.tick(1.0), Some(INFO_SECS - 1.0));
+        assert_eq!(messages.tick(INFO_SECS), Some(ERROR_SECS - INFO_SECS));
         let shown: Vec<_> = messages
             .entries()
             .iter()
             .map(|entry| entry.shown_until.is_some())
             .collect();
         assert_eq!(shown, [false, true]);
+        assert_eq!(messages.tick(ERROR_SECS), None);
+        assert_eq!(messages.entries().len(), 2, "the log keeps them");
     }
 
     #[test]

@@ -150,7 +150,7 @@ impl Scene {
             .set_highlight(&self.state.device, &self.state.queue, ranges);
     }
 
-    /// Shows the sources as spheres: green where the stored normal was kept, pink where it was flipped.
+    /// Shows the sources as spheres: green where they keep the side that was there, pink where they flipped it.
     pub fn show_sources(&mut self, session: &Session) {
         let positions = session.document.cloud().positions();
         let selected: &BTreeSet<u32> = &session.selected;
@@ -159,7 +159,7 @@ impl Scene {
             .sources()
             .iter()
             .filter_map(|source| {
-                let color = if session.is_flipped(source) {
+                let color = if session.document.is_flipped(source) {
                     theme::SOURCE_FLIPPED
                 } else {
                     theme::SOURCE_KEPT

@@ -87,14 +87,6 @@ impl Session {
         self.selected.retain(|&point| sources.get(point).is_some());
     }
 
-    /// Whether the stored normal at `source` is against the vouched direction, so that its point is drawn flipped.
-    pub fn is_flipped(&self, source: &Source) -> bool {
-        self.document
-            .propagation()
-            .and_then(|propagation| propagation.normals.get(source.point as usize))
-            .is_some_and(|normal| normal.dot(source.normal) < 0.0)
-    }
-
     /// The rule that decided the sides, for the exported file's comment.
     pub fn rule(&self) -> String {
         let start = match self.document.parameters().start {

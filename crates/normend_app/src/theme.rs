@@ -19,9 +19,9 @@ pub const SIDE_PANEL_WIDTH: f32 = 324.0;
 /// Width of the first column of label/value rows, in points.
 pub const LABEL_WIDTH: f32 = 104.0;
 
-/// Color of a source whose stored normal was kept.
+/// Color of a source that keeps the side its point has without sources.
 pub const SOURCE_KEPT: [f32; 3] = [0.18, 0.72, 0.36];
-/// Color of a source whose stored normal was flipped.
+/// Color of a source that flipped its point.
 pub const SOURCE_FLIPPED: [f32; 3] = [0.93, 0.35, 0.68];
 
 /// The colors of one theme that are not egui's own names.

@@ -6,6 +6,7 @@ use crate::messages::{Level, Message, Messages};
 use crate::theme::{self, SPACE_M, SPACE_S};
 
 const WIDTH: f32 = 380.0;
+const LOG_SIZE: Vec2 = Vec2::new(520.0, 280.0);
 const MAX_SHOWN: usize = 4;
 
 /// The newest messages in the upper right corner of `view`.
@@ -63,7 +64,8 @@ fn text(message: &Message) -> String {
 pub fn log(ui: &Ui, open: &mut bool, messages: &Messages) {
     egui::Window::new("Messages")
         .open(open)
-        .default_size([520.0, 280.0])
+        .default_size(LOG_SIZE)
+        .default_pos(ui.ctx().content_rect().center() - 0.5 * LOG_SIZE)
         .collapsible(false)
         .show(ui.ctx(), |ui| {
             if messages.entries().is_empty() {

@@ -5,6 +5,9 @@ use egui::{Align2, RichText, ScrollArea, Ui, Vec2};
 use crate::command::{Command, MOUSE, Menu};
 use crate::theme::{self, SPACE_L, SPACE_XS};
 
+/// Width of each column, so that they align from section to section.
+const SHEET_COLUMN: f32 = 236.0;
+
 /// The window with every key and what the mouse does.
 pub fn ui(ui: &Ui, open: &mut bool) {
     egui::Window::new("Keys and mouse")
@@ -22,11 +25,14 @@ pub fn ui(ui: &Ui, open: &mut bool) {
                         ui.spacing_mut().item_spacing.x = 2.0 * SPACE_L;
                         ui.vertical(|ui| {
                             mouse(ui);
-                            for menu in [Menu::File, Menu::Edit, Menu::Help] {
+                            for menu in [Menu::File, Menu::Edit] {
                                 keys(ui, menu);
                             }
                         });
-                        ui.vertical(|ui| keys(ui, Menu::View));
+                        ui.vertical(|ui| {
+                            keys(ui, Menu::View);
+                            keys(ui, Menu::Help);
+                        });
                     });
                 });
         });
@@ -57,9 +63,11 @@ fn keys(ui: &mut Ui, menu: Menu) {
 fn sheet(ui: &mut Ui, id: &str, rows: impl Iterator<Item = (&'static str, String)>) {
     egui::Grid::new(id)
         .num_columns(2)
-        .min_col_width(208.0)
+        .min_col_width(SHEET_COLUMN)
         .spacing([SPACE_L, SPACE_XS])
         .show(ui, |ui| {
+            // Nothing here can be clicked, so rows may stand close.
+            ui.spacing_mut().interact_size.y = 16.0;
             for (what, keys) in rows {
                 ui.label(what);
                 ui.label(

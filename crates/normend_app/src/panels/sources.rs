@@ -55,7 +55,7 @@ pub fn ui(ui: &mut Ui, session: &Session) -> Option<Action> {
         .auto_shrink([false, true])
         .show_rows(ui, ROW_HEIGHT, sources.len(), |ui, rows| {
             for source in sources.iter().skip(rows.start).take(rows.len()) {
-                let flipped = session.is_flipped(source);
+                let flipped = session.document.is_flipped(source);
                 let response = row(
                     ui,
                     source.point,

@@ -157,6 +157,17 @@ impl Document {
         &self.sources
     }
 
+    /// Whether a source is *flipped*: it vouches for the other side than the one its point has without any source. Before
+    /// the first [`Self::install`] none is, and neither is one past the end of the cloud.
+    pub fn is_flipped(&self, source: &Source) -> bool {
+        let point = source.point;
+        self.derived.as_ref().is_some_and(|derived| {
+            let normals = &derived.propagation.normals;
+            let stored = normals.get(point as usize);
+            stored.is_some_and(|&stored| source.turns(stored) != derived.regions.starts_turned(point))
+        })
+    }
+
     /// Applies an edit, remembers its inverse, forgets what was undone. Returns what turned.
     ///
     /// An edit that leaves every source as it is (adding what is there already) is not remembered. Before the first

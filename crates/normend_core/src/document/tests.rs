@@ -268,6 +268,9 @@ fn the_first_mend_vouches_for_the_default_source_too() {
         document.sources().iter().collect::<Vec<_>>(),
         [&default, &source(4, down)]
     );
+    assert!(!document.is_flipped(&default));
+    assert!(document.is_flipped(&source(4, down)));
+    assert!(!document.is_flipped(&source(5, down)));
     // Who mends the default source itself says that all is wrong.
     document.undo();
     assert!(document.sources().is_empty());

@@ -153,6 +153,18 @@ impl Regions {
         Change::from_flips(&flips)
     }
 
+    /// Whether the stored normal of `point` is turned when there is no source: by the default sign of its base region.
+    pub fn starts_turned(&self, point: u32) -> bool {
+        let position = self.tree.position(point);
+        let mut top = position;
+        while !self.initial_tops.contains(top as usize)
+            && let Some(parent) = self.tree.parent(top)
+        {
+            top = parent;
+        }
+        self.initially_turned.contains(top as usize) ^ self.tree.phi(top) ^ self.tree.phi(position)
+    }
+
     /// Whether `a` and `b` are in one region.
     pub fn in_one_region(&self, a: u32, b: u32) -> bool {
         self.top_of(self.tree.position(a)) == self.top_of(self.tree.position(b))

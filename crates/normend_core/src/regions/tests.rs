@@ -104,6 +104,8 @@ proptest! {
         let start = say(&regions);
         batches.into_iter().for_each(|batch| drop(regions.set(batch)));
         regions.set((0..world.n_points as u32).map(|point| (point, None)));
+        let starts: Vec<_> = (0..world.n_points as u32).map(|point| (regions.starts_turned(point), None)).collect();
+        prop_assert_eq!(&starts, &start);
         prop_assert_eq!(say(&regions), start);
         prop_assert_eq!(regions.n_sources(), 0);
     }
