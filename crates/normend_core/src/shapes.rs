@@ -13,7 +13,7 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use self::random::Random;
-use self::solid::{Primitive, Solid};
+use self::solid::{Cavity, Primitive, Solid};
 
 /// A generated cloud: `n` positions and their exact outward unit normals.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -140,8 +140,8 @@ pub fn fandisk_like(n_points: usize) -> Shape {
             Primitive::cylinder(DVec3::new(2.0, 0.5, 0.4), DVec3::Z, 0.5, 0.4),
         ],
         cavities: vec![
-            Primitive::cylinder(DVec3::new(1.22, 0.5, 1.0), DVec3::Y, 0.45, 1.0),
-            Primitive::cylinder(DVec3::new(2.0, 0.5, 0.4), DVec3::Z, 0.25, 1.0),
+            Cavity::whole(Primitive::cylinder(DVec3::new(1.22, 0.5, 1.0), DVec3::Y, 0.45, 1.0)),
+            Cavity::whole(Primitive::cylinder(DVec3::new(2.0, 0.5, 0.4), DVec3::Z, 0.25, 1.0)),
         ],
     };
     solid.sample(n_points)
@@ -149,18 +149,19 @@ pub fn fandisk_like(n_points: usize) -> Shape {
 
 /// A bearing bracket, 110 × 50 × 74: base plate with four bolt holes, thin ribs, an eye with a spherical seat.
 ///
-/// The seat is undercut: at its sharp rims the outward normals of seat and face are 136° apart, which the dot product takes
-/// for two that point to opposite sides. So the default orientation has the seat inside out, and the rim is the heaviest
-/// edge around it.
+/// The seat is undercut: at its rims the outward normals of seat and face are 146° apart, which the dot product takes for
+/// two that point to opposite sides. So the default orientation has the seat inside out. The narrow chamfers between seat
+/// and faces are missing, as a scanner leaves out what shines, so no normals lie in between: the edges across are the
+/// heaviest around, and a mend of the seat cuts there.
 pub fn mechanical_part(n_points: usize) -> Shape {
-    let bolt_hole = |x: f64, y: f64| Primitive::cylinder(DVec3::new(x, y, 4.0), DVec3::Z, 4.0, 10.0);
+    let bolt_hole = |x: f64, y: f64| Cavity::whole(Primitive::cylinder(DVec3::new(x, y, 4.0), DVec3::Z, 4.0, 10.0));
     let rib = |from: f64, to: f64| Primitive::block(DVec3::new(from, -1.25, 4.0), DVec3::new(to, 1.25, 30.0));
     let center = DVec3::new(0.0, 0.0, 48.0);
     let solid = Solid {
         parts: vec![
             Primitive::block(DVec3::new(-55.0, -25.0, 0.0), DVec3::new(55.0, 25.0, 8.0)),
-            Primitive::block(DVec3::new(-26.0, -13.0, 4.0), DVec3::new(26.0, 13.0, 48.0)),
-            Primitive::cylinder(center, DVec3::Y, 26.0, 13.0),
+            Primitive::block(DVec3::new(-26.0, -15.0, 4.0), DVec3::new(26.0, 15.0, 48.0)),
+            Primitive::cylinder(center, DVec3::Y, 26.0, 15.0),
             rib(-44.0, -20.0),
             rib(20.0, 44.0),
         ],
@@ -169,7 +170,10 @@ pub fn mechanical_part(n_points: usize) -> Shape {
             bolt_hole(-47.0, 17.0),
             bolt_hole(47.0, -17.0),
             bolt_hole(47.0, 17.0),
-            Primitive::ball(center, 18.0),
+            Cavity {
+                primitive: Primitive::ball(center, 18.0),
+                unseen_rim: 1.05,
+            },
         ],
     };
     solid.sample(n_points)

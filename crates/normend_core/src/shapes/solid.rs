@@ -26,11 +26,29 @@ pub(super) enum Primitive {
     Ball { center: DVec3, radius: f64 },
 }
 
+/// A hole in a solid.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cavity {
+    pub primitive: Primitive,
+    /// Width of the strip inside the hole, along the faces it breaks through, that has no points.
+    pub unseen_rim: f64,
+}
+
+impl Cavity {
+    /// A hole with points up to its rims.
+    pub fn whole(primitive: Primitive) -> Self {
+        Self {
+            primitive,
+            unseen_rim: 0.0,
+        }
+    }
+}
+
 /// The union of parts without the cavities.
 #[derive(Clone, Debug)]
 pub(super) struct Solid {
     pub parts: Vec<Primitive>,
-    pub cavities: Vec<Primitive>,
+    pub cavities: Vec<Cavity>,
 }
 
 /// A point on the surface with its outward normal.
@@ -72,7 +90,10 @@ impl Solid {
             let is_outside_others = |point: DVec3| {
                 self.parts[..i].iter().all(|other| !other.contains(point, -ROUNDING))
                     && self.parts[i + 1..].iter().all(|other| !other.contains(point, ROUNDING))
-                    && self.cavities.iter().all(|cavity| !cavity.contains(point, ROUNDING))
+                    && self
+                        .cavities
+                        .iter()
+                        .all(|cavity| !cavity.primitive.contains(point, ROUNDING))
             };
             let visible = part.sample(density).into_iter();
             samples.extend(visible.filter(|sample| is_outside_others(sample.0)));
@@ -80,10 +101,12 @@ impl Solid {
         for (i, cavity) in self.cavities.iter().enumerate() {
             let is_in_material = |point: DVec3| {
                 let mut others = self.cavities[..i].iter().chain(&self.cavities[i + 1..]);
-                self.parts.iter().any(|part| part.contains(point, ROUNDING))
-                    && others.all(|other| !other.contains(point, ROUNDING))
+                self.parts
+                    .iter()
+                    .any(|part| part.contains(point, ROUNDING + cavity.unseen_rim))
+                    && others.all(|other| !other.primitive.contains(point, ROUNDING))
             };
-            let walls = cavity.sample(density).into_iter();
+            let walls = cavity.primitive.sample(density).into_iter();
             samples.extend(
                 walls
                     .filter(|wall| is_in_material(wall.0))
