@@ -121,9 +121,9 @@ impl Places {
 
         let scale = power_of_two_near(cloud.diagonal()).recip();
         let mut places = Self {
-            positions: Vec::new(),
+            positions: Vec::with_capacity(ids.len()),
             ids: Vec::new(),
-            starts: Vec::new(),
+            starts: Vec::with_capacity(ids.len() + 1),
         };
         let mut previous = Vec3::NAN;
         for (start, &id) in ids.iter().enumerate() {

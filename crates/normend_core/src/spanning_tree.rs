@@ -359,10 +359,10 @@ mod tests {
                 let point = y * side + x;
                 let weight = ((point.wrapping_mul(2_654_435_761) >> 28) & 3) as f32;
                 if x + 1 < side {
-                    edges.push((point, point + 1, weight, point % 3 == 0));
+                    edges.push((point, point + 1, weight, point.is_multiple_of(3)));
                 }
                 if y + 1 < side {
-                    edges.push((point, point + side, weight, point % 5 == 0));
+                    edges.push((point, point + side, weight, point.is_multiple_of(5)));
                 }
             }
         }
