@@ -320,7 +320,7 @@ pub const MOUSE: [(&str, &str); 10] = [
     ("Move over the scan", "Show what a click would turn"),
     ("Click", "Mend: turn the wrong region"),
     ("Ctrl-click", "Turn all that hangs together"),
-    ("Click a source", "Select it; with Shift, add to the selection"),
+    ("Click a source", "Select it; Shift adds to the selection"),
     ("Left drag", "Orbit"),
     ("Right, middle or Shift-left drag", "Pan"),
     ("Wheel", "Zoom to the pointer"),

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use normend_core::{Change, Document, Edit, EditError, Parameters, Source, Start};
+use normend_core::{Change, Document, Edit, EditError, Parameters, Start};
 use normend_io::Scan;
 
 /// An open scan.

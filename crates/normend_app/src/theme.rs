@@ -18,6 +18,8 @@ pub const SPACE_L: f32 = 16.0;
 pub const SIDE_PANEL_WIDTH: f32 = 324.0;
 /// Width of the first column of label/value rows, in points.
 pub const LABEL_WIDTH: f32 = 104.0;
+/// Height of rows that are only read, in points.
+pub const FACT_HEIGHT: f32 = 18.0;
 
 /// Color of a source that keeps the side its point has without sources.
 pub const SOURCE_KEPT: [f32; 3] = [0.18, 0.72, 0.36];
@@ -200,17 +202,28 @@ pub fn section<R>(ui: &mut Ui, title: &str, rows: impl FnOnce(&mut Ui) -> R) -> 
     result
 }
 
-/// Label/value rows whose columns align in every section.
+/// Rows with inputs: labels and values whose columns align in every section.
 pub fn rows<R>(ui: &mut Ui, id: &str, add_rows: impl FnOnce(&mut Ui) -> R) -> R {
+    let height = ui.spacing().interact_size.y;
+    grid(ui, id, height, add_rows)
+}
+
+/// Rows that are only read, so they may stand closer than [`rows`].
+pub fn facts<R>(ui: &mut Ui, id: &str, add_rows: impl FnOnce(&mut Ui) -> R) -> R {
+    grid(ui, id, FACT_HEIGHT, add_rows)
+}
+
+fn grid<R>(ui: &mut Ui, id: &str, row_height: f32, add_rows: impl FnOnce(&mut Ui) -> R) -> R {
     egui::Grid::new(id)
         .num_columns(2)
         .min_col_width(LABEL_WIDTH)
+        .min_row_height(row_height)
         .spacing([SPACE_S, SPACE_XS])
         .show(ui, add_rows)
         .inner
 }
 
-/// One label/value row of [`rows`].
+/// One label/value row of [`rows`] or [`facts`].
 pub fn row(ui: &mut Ui, label: &str, value: impl Into<String>) {
     ui.label(RichText::new(label).weak());
     ui.add(egui::Label::new(value.into()).truncate());

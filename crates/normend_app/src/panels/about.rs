@@ -17,7 +17,7 @@ pub fn ui(ui: &Ui, open: &mut bool, adapter: &str) {
                         “Mendable Consistent Orientation of Point Clouds”.";
             ui.add(egui::Label::new(what).wrap());
             ui.add_space(SPACE_S);
-            theme::rows(ui, "about", |ui| {
+            theme::facts(ui, "about", |ui| {
                 theme::row(ui, "Version", env!("CARGO_PKG_VERSION"));
                 theme::row(ui, "License", env!("CARGO_PKG_LICENSE"));
                 ui.label(RichText::new("Graphics").weak());

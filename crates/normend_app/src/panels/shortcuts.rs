@@ -64,10 +64,9 @@ fn sheet(ui: &mut Ui, id: &str, rows: impl Iterator<Item = (&'static str, String
     egui::Grid::new(id)
         .num_columns(2)
         .min_col_width(SHEET_COLUMN)
+        .min_row_height(theme::FACT_HEIGHT)
         .spacing([SPACE_L, SPACE_XS])
         .show(ui, |ui| {
-            // Nothing here can be clicked, so rows may stand close.
-            ui.spacing_mut().interact_size.y = 16.0;
             for (what, keys) in rows {
                 ui.label(what);
                 ui.label(

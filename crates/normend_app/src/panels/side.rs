@@ -36,9 +36,7 @@ pub fn ui(
 }
 
 fn scan(ui: &mut Ui, session: &Session) {
-    theme::rows(ui, "scan", |ui| {
-        // Rows that are only read stand closer than rows with inputs.
-        ui.spacing_mut().interact_size.y = 18.0;
+    theme::facts(ui, "scan", |ui| {
         theme::row(
             ui,
             "File",
