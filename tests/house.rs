@@ -235,8 +235,10 @@ fn every_end_to_end_test_is_claimed_by_one_crate() {
         .iter()
         .map(|path| fs::read_to_string(path).unwrap())
         .collect();
-    let tests = files_below("tests", ".rs");
-    assert!(!tests.is_empty());
+    let mut tests = files_below("tests", ".rs");
+    // Modules of a test lie in a folder of its name.
+    tests.retain(|path| path.parent().is_some_and(|folder| folder.ends_with("tests")));
+    assert!(tests.len() > 3, "the tests are not where they were");
     for test in tests {
         let claim = format!("path = \"../../tests/{}\"", test.file_name().unwrap().to_string_lossy());
         let n_claims = manifests.iter().filter(|text| text.contains(&claim)).count();
