@@ -368,6 +368,7 @@ fn valid_files() -> Vec<(&'static str, Vec<u8>)> {
             "points.xyz",
             b"# a comment\nX Y Z R G B\n1 2 3 4 5 6\n1.5 2 3 4 5 6\n".to_vec(),
         ),
+        ("cloud.asc", b"//X Y Z R\n1 2 3 4\n1.5 2 3 4\n".to_vec()),
         ("scan.pts", b"2\n1 2 3 0 0 1\n4 5 6 0 1 0\n".to_vec()),
     ]
 }
@@ -403,7 +404,7 @@ proptest! {
 
     #[test]
     fn damage_gives_a_sentence_or_a_scan_that_can_be_written(
-        which in 0..5_usize,
+        which in 0..6_usize,
         damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..4_u8), 1..6),
     ) {
         let (name, mut bytes) = valid_files().swap_remove(which);

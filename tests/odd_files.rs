@@ -267,6 +267,12 @@ fn text_keeps_its_separators_comments_and_columns() {
         "//X;Y;Z;Nx;Ny;Nz;R\n1;2;3;1;0;0;9\n4;5;6;0;0;-1;9\n",
     );
     check(
+        "a.asc",
+        "\u{feff}# seen by hand\r\n//X Y Z R\r\n1 2 3 9\r\n4 5 6 9\r\n",
+        &normals,
+        "\u{feff}# seen by hand\r\n//X Y Z Nx Ny Nz R\r\n1 2 3 1 0 0 9\r\n4 5 6 0 0 -1 9\r\n",
+    );
+    check(
         "a.pts",
         "1\n1 2 3 -12 0 0 0\n1\n4 5 6 -12 0 0 0\n",
         &normals,

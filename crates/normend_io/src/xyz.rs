@@ -149,6 +149,8 @@ impl XyzLayout {
             self.names = Some(names);
             self.columns = columns;
             self.table.has_normals = has_normals;
+            // Names in a comment: the rows begin after it, because export may add names.
+            row_start = row_start.max(names.end);
         } else {
             self.names = title.filter(|title| names.contains(title));
             self.table.has_normals = self.sample_is_normals(bytes, lines);
