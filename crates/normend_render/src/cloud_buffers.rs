@@ -170,12 +170,19 @@ impl CloudBuffers {
         }
 
         let (max_radius, bounds) = cloud.extent();
-        let memory_scope = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let turned_buffer = storage_buffer(device, "signs", &turned);
-        let mut chunks = Vec::with_capacity(n_points.div_ceil(chunk_points));
+        let n_chunks = n_points.div_ceil(chunk_points);
+        let bytes = needed + (n_points * size_of::<Point>() + n_chunks * size_of::<Chunk>()) as u64;
+        let out_of_memory = |error: wgpu::Error| RenderError::OutOfMemory {
+            n_points,
+            needed: bytes,
+            reason: error.to_string(),
+        };
+        let turned_buffer = storage_buffer(device, "signs", &turned).map_err(out_of_memory)?;
+        let mut chunks = Vec::with_capacity(n_chunks);
         for first in (0..n_points).step_by(chunk_points) {
             let end = n_points.min(first + chunk_points);
-            let points = storage_buffer(device, "points", &cloud.pack(first..end, max_radius));
+            let packed = cloud.pack(first..end, max_radius);
+            let points = storage_buffer(device, "points", &packed).map_err(out_of_memory)?;
             let uniform = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
                 label: Some("chunk"),
                 contents: bytemuck::bytes_of(&Chunk {
@@ -204,14 +211,6 @@ impl CloudBuffers {
                 bind_group,
                 first: first as u32,
                 n_points: (end - first) as u32,
-            });
-        }
-        let bytes = needed + (n_points * size_of::<Point>() + chunks.len() * size_of::<Chunk>()) as u64;
-        if let Some(error) = pollster::block_on(memory_scope.pop()) {
-            return Err(RenderError::OutOfMemory {
-                n_points,
-                needed: bytes,
-                reason: error.to_string(),
             });
         }
         *uploaded += bytes;
@@ -286,12 +285,32 @@ impl CloudBuffers {
     }
 }
 
-fn storage_buffer<T: bytemuck::Pod>(device: &wgpu::Device, label: &str, data: &[T]) -> wgpu::Buffer {
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+/// A buffer that holds `data`, which is not empty and of whole words; an error when the graphics memory is full.
+///
+/// Not by `create_buffer_init`, which panics then.
+fn storage_buffer<T: bytemuck::Pod>(
+    device: &wgpu::Device,
+    label: &str,
+    data: &[T],
+) -> Result<wgpu::Buffer, wgpu::Error> {
+    let bytes: &[u8] = bytemuck::cast_slice(data);
+    let memory_scope = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
-        contents: bytemuck::cast_slice(data),
+        size: bytes.len() as u64,
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-    })
+        mapped_at_creation: true,
+    });
+    if let Some(error) = pollster::block_on(memory_scope.pop()) {
+        return Err(error);
+    }
+    // Only a lost device gives no range, and then there is nothing to write to.
+    if let Ok(mut mapped) = buffer.get_mapped_range_mut(..) {
+        mapped.slice(..).copy_from_slice(bytes);
+        drop(mapped);
+        buffer.unmap();
+    }
+    Ok(buffer)
 }
 
 /// Flips the bits of a range that is not empty and lies within `words`.
