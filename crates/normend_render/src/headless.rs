@@ -16,8 +16,8 @@ pub struct HeadlessDevice {
 }
 
 impl HeadlessDevice {
-    /// Opens the best adapter that can draw splats: graphics cards first, then software; OpenGL only where there is
-    /// nothing else. The environment variable `WGPU_BACKEND` (`vulkan`, `gl`, …) restricts the choice.
+    /// Opens the best adapter that can draw splats and be opened: graphics cards first, then software; OpenGL only where
+    /// there is nothing else. The environment variable `WGPU_BACKEND` (`vulkan`, `gl`, …) restricts the choice.
     ///
     /// # Errors
     /// [`RenderError::NoAdapter`], [`RenderError::Unsupported`] or [`RenderError::Device`], in words for the user.
@@ -43,8 +43,9 @@ impl HeadlessDevice {
         adapters.sort_by_key(rank);
         let mut refused = None;
         for adapter in adapters {
-            match SplatRenderer::check_adapter(&adapter) {
-                Ok(()) => return Self::open(adapter),
+            match SplatRenderer::check_adapter(&adapter).and_then(|()| Self::open(adapter)) {
+                Ok(device) => return Ok(device),
+                // A card whose driver is broken must not keep the software behind it from drawing.
                 Err(error) => refused = refused.or(Some(error)),
             }
         }
