@@ -4,8 +4,12 @@ use std::mem::{offset_of, size_of};
 
 use egui_wgpu::wgpu::naga;
 
+use crate::DisplayMode;
 use crate::gpu_types::{Chunk, Frame, Look, Point, SphereMark};
 use crate::shader::{SHADE, SPHERE, SPLAT, Shader};
+
+/// All shaders: the tests below go through them.
+const SHADERS: [Shader; 3] = [SPLAT, SPHERE, SHADE];
 
 /// A struct: its name, its size, its fields with their offsets.
 type Layout = (String, usize, Vec<(String, usize)>);
@@ -59,7 +63,7 @@ fn layouts(module: &naga::Module) -> Vec<Layout> {
 #[test]
 fn shaders_are_valid_and_their_structs_match() {
     let mut seen = Vec::new();
-    for Shader { name, source } in [SPLAT, SPHERE, SHADE] {
+    for Shader { name, source } in SHADERS {
         let module = validate(name, source).unwrap_or_else(|message| panic!("{name}: {message}"));
         for layout in layouts(&module) {
             let expect = twins().into_iter().find(|twin| twin.0 == layout.0).unwrap();
@@ -72,11 +76,29 @@ fn shaders_are_valid_and_their_structs_match() {
     }
 }
 
+/// A new shader must not slip past the tests.
+#[test]
+fn every_file_of_the_folder_is_tested() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shaders");
+    let mut names: Vec<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    let mut expect: Vec<String> = SHADERS.iter().map(|shader| format!("{}.wgsl", shader.name)).collect();
+    expect.push("common.wgsl".to_owned());
+    expect.sort();
+    assert_eq!(names, expect);
+}
+
 #[test]
 fn constants_match() {
     use crate::gpu_types as rust;
-    let module = validate("splat", SPLAT.source).unwrap();
-    let literal = |name: &str| {
+    let (splat, shade) = (
+        validate("splat", SPLAT.source).unwrap(),
+        validate("shade", SHADE.source).unwrap(),
+    );
+    let literal = |module: &naga::Module, name: &str| {
         let (_, constant) = module
             .constants
             .iter()
@@ -88,13 +110,14 @@ fn constants_match() {
             ref other => panic!("{name} is {other:?}"),
         }
     };
-    let check = |name: &str, expect: f64| assert_eq!(literal(name), expect, "{name}");
+    let check = |name: &str, expect: f64| assert_eq!(literal(&splat, name), expect, "{name}");
     check("ID_NONE", f64::from(rust::ID_NONE));
     check("ID_SPHERE", f64::from(rust::ID_SPHERE));
     check("OCT_MAX", f64::from(rust::OCT_MAX));
     check("NO_NORMAL", f64::from(rust::NO_NORMAL));
     check("RADIUS_CODE_MAX", f64::from(rust::RADIUS_CODE_MAX));
     check("RADIUS_CODES_PER_OCTAVE", f64::from(rust::RADIUS_CODES_PER_OCTAVE));
+    assert_eq!(literal(&shade, "MODE_NORMALS"), f64::from(DisplayMode::Normals.code()));
 }
 
 #[test]
