@@ -189,6 +189,8 @@ pub(crate) fn read_values(layout: &dyn Layout, bytes: &[u8], progress: &dyn Prog
     let mut normals = vec![Vec3::ZERO; if table.has_normals { table.n_rows } else { 0 }];
     let n_done = AtomicUsize::new(0);
     let read = |index: usize, positions: &mut [DVec3], normals: &mut [Vec3]| -> Result<(), Stop> {
+        // Before the work, because every part is begun, also when another one stopped.
+        progress.report(n_done.load(Ordering::Relaxed) as f32 / table.n_parts() as f32)?;
         let part = table.part(index);
         let mut rows = layout.rows(bytes, part.bytes.start);
         for row in 0..part.n_rows {
@@ -214,8 +216,7 @@ pub(crate) fn read_values(layout: &dyn Layout, bytes: &[u8], progress: &dyn Prog
                 normals[row] = if normal.is_finite() { normal } else { Vec3::ZERO };
             }
         }
-        let n_done = n_done.fetch_add(1, Ordering::Relaxed) + 1;
-        progress.report(n_done as f32 / table.n_parts() as f32)?;
+        n_done.fetch_add(1, Ordering::Relaxed);
         Ok(())
     };
     let results: Vec<Result<(), Stop>> = if table.has_normals {
