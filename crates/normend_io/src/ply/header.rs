@@ -344,10 +344,15 @@ fn why_not(bytes: &[u8], declaration: &Declaration) -> Broken {
     Broken::new(Place::Line(declaration.line.number), reason)
 }
 
-/// The words of a line.
+/// One more word than the longest declaration has (`property list uchar int name`).
+const MOST_WORDS: usize = 6;
+
+/// The first [`MOST_WORDS`] words of a line, so that a long line takes no more memory than a short one.
 fn words(bytes: &[u8], line: Span) -> Vec<Span> {
     let mut words: Vec<Span> = Vec::new();
-    while let Some(word) = next_token(&bytes[..line.end], words.last().map_or(line.start, |last| last.end)) {
+    while words.len() < MOST_WORDS
+        && let Some(word) = next_token(&bytes[..line.end], words.last().map_or(line.start, |last| last.end))
+    {
         words.push(word);
     }
     words
