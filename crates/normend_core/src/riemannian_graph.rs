@@ -51,7 +51,7 @@ const DISAGREE: u32 = 1 << 31;
 impl HalfEdge {
     fn new(neighbor: u32, weight: f32, disagree: bool) -> Self {
         let sign = if disagree { DISAGREE } else { 0 };
-        // `max` also turns NaN and -0 into 0, so that bits compare as weights do.
+        // NaN and -0 become 0 too, so that bits compare as weights do.
         let weight = if weight > 0.0 { weight } else { 0.0 };
         Self {
             neighbor,
