@@ -89,10 +89,7 @@ impl Session {
 
     /// The rule that decided the sides, for the exported file's comment.
     pub fn rule(&self) -> String {
-        let start = match self.document.parameters().start {
-            Start::Keep if self.scan.given_normals.is_some() => "as given",
-            Start::Keep | Start::Estimate => "farthest along +z up",
-        };
+        let start = self.document.parameters().rule(self.scan.given_normals.is_some());
         match self.document.sources().len() {
             0 => start.to_owned(),
             1 => format!("{start}, 1 source"),

@@ -9,9 +9,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use fixedbitset::FixedBitSet;
 use glam::{DVec3, Vec3};
 use normend_core::sources::Origin;
-use normend_core::{Document, Edit, Estimator, Parameters, PointCloud, Propagation, Silent, Source};
+use normend_core::{Document, Edit, Estimator, Parameters, PointCloud, Propagation, Regions, Silent, Source};
 
 /// Random numbers: SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators").
 struct Random(u64);
@@ -62,12 +63,13 @@ fn scan(n_points: usize, n_points_per_cut: Option<usize>) -> Document {
         unreachable!("silent progress never cancels")
     };
     if let Some(n_points_per_cut) = n_points_per_cut {
+        let tree = Arc::clone(&propagation.tree);
+        let mut cuts = FixedBitSet::with_capacity(n_points);
         for position in 0..n_points {
-            let is_root = propagation.tree.parent(position as u32).is_none();
-            propagation
-                .initial_cuts
-                .set(position, !is_root && random.below(n_points_per_cut) == 0);
+            let is_root = tree.parent(position as u32).is_none();
+            cuts.set(position, !is_root && random.below(n_points_per_cut) == 0);
         }
+        propagation.base_regions = Regions::new(tree, cuts, FixedBitSet::with_capacity(n_points));
     }
     let mut document = Document::new(Arc::new(cloud), None);
     document.install(propagation);
@@ -144,9 +146,9 @@ fn click(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("click");
     for (n_points, n_points_per_cut) in [(1_000_000, None), (1_000_000, Some(10)), (5_000_000, None)] {
         let mut document = scan(n_points, n_points_per_cut);
-        let n_cuts = document
-            .propagation()
-            .map_or(0, |propagation| propagation.initial_cuts.count_ones(..));
+        let n_cuts = document.propagation().map_or(0, |propagation| {
+            propagation.base_regions.n_base_regions() - propagation.tree.roots().len()
+        });
         let mut random = Random(2);
         for n_sources in [1, 1000] {
             while document.sources().len() < n_sources {

@@ -12,7 +12,9 @@ use glam::Vec3;
 
 use self::given::GivenNormals;
 use crate::progress::Part;
-use crate::{Cancelled, EdgeRule, Estimator, Neighbors, PointCloud, Progress, RiemannianGraph, SpanningTree, normals};
+use crate::{
+    Cancelled, EdgeRule, Estimator, Neighbors, PointCloud, Progress, Regions, RiemannianGraph, SpanningTree, normals,
+};
 
 /// Which normals and signs a document starts from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,6 +68,14 @@ impl Parameters {
 
     /// What [`Self::k_graph`] can be; a value outside counts as the nearest one inside.
     pub const K_GRAPH: RangeInclusive<usize> = 1..=200;
+
+    /// The rule that decides the sides where no source does, in words for files: "as given", "farthest along +z up".
+    pub fn rule(&self, has_given_normals: bool) -> &'static str {
+        match self.start {
+            Start::Keep if has_given_normals => "as given",
+            Start::Keep | Start::Estimate => "farthest along +z up",
+        }
+    }
 }
 
 impl Default for Parameters {
@@ -118,12 +128,9 @@ pub struct Propagation {
     pub splat_radii: Arc<Vec<f32>>,
     /// The tree that signs travel along.
     pub tree: Arc<SpanningTree>,
-    /// Initial cuts by position: the parent edge of a set position carries no sign, because the given signs of its
-    /// ends disagree with the edge rule. Empty for [`Start::Estimate`]. Roots are never set.
-    pub initial_cuts: FixedBitSet,
-    /// For each initial region (roots and initial cuts), by the position of its top: whether the stored normal *there*
-    /// starts turned. With [`Start::Estimate`]: so that the component's default source points up.
-    pub initially_turned: FixedBitSet,
+    /// The base regions, without a source: with [`Start::Estimate`] the components, each so that its default source points
+    /// up; with [`Start::Keep`] cut wherever the given signs of an edge's ends disagree with the edge rule.
+    pub base_regions: Regions,
     /// The point of each component's default source, in the order of the tree's roots: the one farthest along +z. Empty
     /// where signs start as given: there each region has the signs that came with it.
     pub default_sources: Vec<u32>,
@@ -185,15 +192,16 @@ impl Propagation {
             given.cut_disagreements(&tree, &mut initial_cuts, &mut initially_turned);
             default_sources.clear();
         }
+        let tree = Arc::new(tree);
+        let base_regions = Regions::new(Arc::clone(&tree), initial_cuts, initially_turned);
         clock.finish(Stage::Tree);
 
         Ok(Self {
             parameters,
             normals: Arc::new(normals),
             splat_radii: Arc::new(splat_radii),
-            tree: Arc::new(tree),
-            initial_cuts,
-            initially_turned,
+            tree,
+            base_regions,
             default_sources,
             seconds: clock.seconds,
         })
@@ -203,18 +211,15 @@ impl Propagation {
 impl Propagation {
     /// `n` oriented normals by point as they are before any source: those that a document without sources shows. O(n).
     pub fn initial_normals(&self) -> Vec<Vec3> {
-        let mut turned = FixedBitSet::with_capacity(self.tree.n_points());
+        let orientation = self.base_regions.orientation();
         let mut normals = vec![Vec3::ZERO; self.tree.n_points()];
-        for (position, &point) in self.tree.order().iter().enumerate() {
-            let is_turned = match self.tree.parent(position as u32) {
-                Some(parent) if !self.initial_cuts.contains(position) => {
-                    turned.contains(parent as usize) ^ self.tree.phi(parent) ^ self.tree.phi(position as u32)
-                }
-                _ => self.initially_turned.contains(position),
-            };
-            turned.set(position, is_turned);
+        for (position, &point) in (0_u32..).zip(self.tree.order()) {
             let normal = self.normals[point as usize];
-            normals[point as usize] = if is_turned { -normal } else { normal };
+            normals[point as usize] = if orientation.is_turned(position) {
+                -normal
+            } else {
+                normal
+            };
         }
         normals
     }

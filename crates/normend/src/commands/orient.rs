@@ -224,10 +224,10 @@ fn orient(job: &Job, parameters: Parameters, overwrite: bool, bar: &Bar) -> anyh
         .0
         .extend(propagation.seconds.iter().map(|&(stage, secs)| (stage.name(), secs)));
     let components = propagation.tree.roots().len();
-    let sources = components + propagation.initial_cuts.count_ones(..);
+    let sources = propagation.base_regions.n_base_regions();
 
     let signs_started = Instant::now();
-    let rule = rule_of(parameters.start, scan.given_normals.is_some());
+    let rule = parameters.rule(scan.given_normals.is_some());
     let mut document = Document::new(scan.cloud.clone(), scan.given_normals.clone());
     document.install(propagation);
     let normals = document.oriented_normals().ok_or(EditError::NotReady)?;
@@ -256,14 +256,6 @@ fn orient(job: &Job, parameters: Parameters, overwrite: bool, bar: &Bar) -> anyh
         seconds,
         peak_rss_bytes: peak_rss_bytes(),
     })
-}
-
-/// The rule that decided the sides, for the file's comment.
-fn rule_of(start: Start, has_given_normals: bool) -> &'static str {
-    match start {
-        Start::Keep if has_given_normals => "as given",
-        Start::Keep | Start::Estimate => "farthest along +z up",
-    }
 }
 
 /// One line for a person: what came out, and where it is.

@@ -132,11 +132,7 @@ impl Document {
             self.cloud.n_points(),
             "the propagation is of another cloud"
         );
-        let regions = Regions::new(
-            Arc::clone(&propagation.tree),
-            &propagation.initial_cuts,
-            &propagation.initially_turned,
-        );
+        let regions = propagation.base_regions.clone();
         let derived = self.derived.insert(Derived { propagation, regions });
         derived.set(self.sources.iter().map(|&source| (source.point, Some(source))));
     }

@@ -41,8 +41,11 @@ fn propagation_of(world: &World, normals: &[Vec3]) -> Propagation {
         normals: Arc::new(normals.to_vec()),
         splat_radii: Arc::new(vec![1.0; world.n_points]),
         tree: Arc::clone(&world.tree),
-        initial_cuts: world.initial_cuts.clone(),
-        initially_turned: world.initially_turned.clone(),
+        base_regions: Regions::new(
+            Arc::clone(&world.tree),
+            world.initial_cuts.clone(),
+            world.initially_turned.clone(),
+        ),
         default_sources: default_sources(&world.tree),
         seconds: Vec::new(),
     }

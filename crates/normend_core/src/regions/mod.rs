@@ -62,18 +62,18 @@ enum Part {
 impl Regions {
     /// The base regions of `tree` with their default signs, without a vouched source. O(n).
     ///
-    /// `initial_cuts` and `initially_turned` are by position, as in [`crate::Propagation`]: the parent edges of the set
-    /// positions are cut, and the stored normals at the tops of base regions start turned where
-    /// `initially_turned` is set.
-    pub fn new(tree: Arc<SpanningTree>, initial_cuts: &FixedBitSet, initially_turned: &FixedBitSet) -> Self {
+    /// Both sets are by position: the parent edges of `initial_cuts` carry no sign, and of the tops of base regions (roots
+    /// and initial cuts) those in `initially_turned` start with their stored normal turned.
+    pub fn new(tree: Arc<SpanningTree>, initial_cuts: FixedBitSet, initially_turned: FixedBitSet) -> Self {
         let n_points = tree.n_points();
-        let mut initial_tops = FixedBitSet::with_capacity(n_points);
+        let mut initial_tops = initial_cuts;
+        initial_tops.grow(n_points);
         let mut tops = PositionSet::new(n_points);
         let mut turned = FixedBitSet::with_capacity(n_points);
         for position in 0..n_points as u32 {
             let index = position as usize;
             match tree.parent(position) {
-                Some(parent) if !initial_cuts.contains(index) => {
+                Some(parent) if !initial_tops.contains(index) => {
                     let turns = tree.phi(parent) != tree.phi(position);
                     turned.set(index, turned.contains(parent as usize) != turns);
                 }
@@ -87,7 +87,7 @@ impl Regions {
         Self {
             tree,
             initial_tops,
-            initially_turned: initially_turned.clone(),
+            initially_turned,
             tops,
             source_by_top: BTreeMap::new(),
             orientation: Orientation::new(turned),
@@ -97,6 +97,11 @@ impl Regions {
     /// The signs that the sources give.
     pub fn orientation(&self) -> &Orientation {
         &self.orientation
+    }
+
+    /// Number of base regions. O(n / 64).
+    pub fn n_base_regions(&self) -> usize {
+        self.initial_tops.count_ones(..)
     }
 
     /// Number of sources.

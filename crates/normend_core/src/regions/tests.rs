@@ -26,7 +26,11 @@ fn difference(before: &Orientation, after: &Orientation) -> Change {
 }
 
 fn regions_of(world: &World) -> Regions {
-    Regions::new(Arc::clone(&world.tree), &world.initial_cuts, &world.initially_turned)
+    Regions::new(
+        Arc::clone(&world.tree),
+        world.initial_cuts.clone(),
+        world.initially_turned.clone(),
+    )
 }
 
 /// As [`Regions::set`] takes it.
