@@ -11,10 +11,11 @@ use crate::dialogs::{DialogAnswer, DialogPurpose};
 use crate::job::JobError;
 use crate::panels::export::ExportWindow;
 use crate::panels::open_path::OpenPathWindow;
+use crate::scene_sync::Scene;
 use crate::session::Session;
 use crate::settings::SPLAT_SCALES;
 use crate::theme;
-use crate::work::{ScanOrigin, Work};
+use crate::work::{ScanOrigin, Uploaded, Work};
 
 const ZOOM_STEP: f32 = 1.25;
 /// Pointer motion that one press of an arrow key stands for, in points.
@@ -89,7 +90,8 @@ impl App {
                 if let Some(session) = &mut self.session {
                     session.draft = parameters;
                     session.requested = parameters;
-                    self.work = Some(Work::propagate(&self.ctx, &session.document, parameters));
+                    let uploader = self.scene.as_ref().map(Scene::uploader);
+                    self.work = Some(Work::propagate(&self.ctx, &session.document, parameters, uploader));
                 }
             }
             Action::SelectSource { point, extend } => self.select(point, extend),
@@ -299,7 +301,8 @@ impl App {
             return;
         }
         // A job that runs is dropped here, so its result cannot arrive.
-        self.work = Some(Work::open(&self.ctx, origin));
+        let uploader = self.scene.as_ref().map(Scene::uploader);
+        self.work = Some(Work::open(&self.ctx, origin, uploader));
     }
 
     pub(crate) fn take_dialogs(&mut self) {
@@ -373,16 +376,16 @@ impl App {
         }
     }
 
-    fn show_scan(&mut self, scan: normend_io::Scan, origin: &ScanOrigin) {
+    fn show_scan(&mut self, scan: Uploaded<normend_io::Scan>, origin: &ScanOrigin) {
         if let ScanOrigin::File(path) = origin {
             self.settings.settings.remember_scan(path);
         }
-        let session = Session::new(scan, origin.name());
+        let session = Session::new(scan.result, origin.name());
         self.viewport.look_at(session.document.cloud());
         self.clicked_revision = None;
         if let Some(scene) = &mut self.scene {
             self.mend.reset(scene);
-            if let Err(error) = scene.show_points(session.document.cloud()) {
+            if let Err(error) = scene.show_points(session.document.cloud(), scan.cloud) {
                 self.messages
                     .error(format!("The scan is open but cannot be shown: {error}."));
             }
@@ -398,14 +401,18 @@ impl App {
         self.act(Action::Propagate(parameters));
     }
 
-    fn install(&mut self, propagation: normend_core::Propagation) {
+    fn install(&mut self, propagation: Uploaded<normend_core::Propagation>) {
         let Some(session) = &mut self.session else { return };
+        let Uploaded {
+            result: propagation,
+            cloud,
+        } = propagation;
         let secs: f64 = propagation.seconds.iter().map(|(_, secs)| secs).sum();
         session.document.install(propagation);
         session.requested = session.document.parameters();
         if let Some(scene) = &mut self.scene {
             self.mend.reset(scene);
-            if let Err(error) = scene.show_document(session) {
+            if let Err(error) = scene.show_document(session, cloud) {
                 self.messages
                     .error(format!("The scan is oriented but cannot be shown: {error}."));
             }

@@ -9,8 +9,10 @@ use std::sync::Arc;
 use eframe::egui_wgpu::RenderState;
 use egui::TextureId;
 use glam::Vec3;
-use normend_core::{Change, PointCloud, SpanningTree};
-use normend_render::{Camera, DrawSettings, Hit, PickRequest, RenderError, Sphere, SplatRenderer, wgpu};
+use normend_core::{Change, PointCloud, Propagation, SpanningTree};
+use normend_render::{
+    Camera, CloudUploader, DrawSettings, Hit, PickRequest, RenderError, Sphere, SplatRenderer, UploadedCloud, wgpu,
+};
 
 use crate::session::Session;
 use crate::theme;
@@ -92,45 +94,40 @@ impl Scene {
         self.renderer.set_spheres(&self.state.device, &self.state.queue, &[]);
     }
 
-    /// Shows points that were just read: no normals yet, one radius for all.
+    /// Uploads clouds from a job's thread.
+    pub fn uploader(&self) -> CloudUploader {
+        self.renderer.uploader(&self.state.device)
+    }
+
+    /// Shows points that were just read: no normals yet, one radius for all. `uploaded` is what [`upload_points`] gave;
+    /// without it the upload is done here, after the present cloud made room.
     ///
     /// # Errors
     /// [`RenderError`] when the graphics adapter cannot hold them.
-    pub fn show_points(&mut self, cloud: &PointCloud) -> Result<(), RenderError> {
+    pub fn show_points(&mut self, cloud: &PointCloud, uploaded: Option<UploadedCloud>) -> Result<(), RenderError> {
         self.clear();
-        let radii = vec![even_radius(cloud); cloud.n_points()];
-        self.renderer.set_cloud(
-            &self.state.device,
-            &self.state.queue,
-            cloud.positions(),
-            None,
-            &radii,
-            None,
-        )
+        let uploaded = uploaded.map_or_else(|| upload_points(&self.uploader(), cloud), Ok)?;
+        self.renderer
+            .show_cloud(&self.state.device, &self.state.queue, uploaded);
+        Ok(())
     }
 
-    /// Shows the document in full after a propagation was installed: O(points). Without one, does nothing.
+    /// Shows the document in full after a propagation was installed. Without one, does nothing. `uploaded` is what
+    /// [`upload_oriented`] gave; without it the upload is done here, after the present cloud made room.
     ///
     /// # Errors
     /// [`RenderError`] when the graphics adapter cannot hold it.
-    pub fn show_document(&mut self, session: &Session) -> Result<(), RenderError> {
+    pub fn show_document(&mut self, session: &Session, uploaded: Option<UploadedCloud>) -> Result<(), RenderError> {
         let document = &session.document;
         let (Some(propagation), Some(orientation)) = (document.propagation(), document.orientation()) else {
             return Ok(());
         };
         self.forget_ids();
         let tree = Arc::clone(&propagation.tree);
+        self.renderer.clear_cloud();
+        let uploaded = uploaded.map_or_else(|| upload_oriented(&self.uploader(), document.cloud(), propagation), Ok)?;
         let (device, queue) = (&self.state.device, &self.state.queue);
-        let positions = document.cloud().positions();
-        self.renderer.set_highlight(device, queue, &[]);
-        self.renderer.set_cloud(
-            device,
-            queue,
-            positions,
-            Some(&propagation.normals),
-            &propagation.splat_radii,
-            Some(tree.order()),
-        )?;
+        self.renderer.show_cloud(device, queue, uploaded);
         self.tree = Some(tree);
         self.renderer.set_turned(queue, &orientation.to_words());
         self.show_sources(session);
@@ -283,6 +280,32 @@ impl Scene {
     pub fn read_picture(&self) -> Option<([u32; 2], Vec<u8>)> {
         self.renderer.read_picture(&self.state.device, &self.state.queue)
     }
+}
+
+/// Uploads points that were just read, for [`Scene::show_points`]. O(n); in any thread.
+///
+/// # Errors
+/// [`RenderError`] when the graphics adapter cannot hold them.
+pub fn upload_points(uploader: &CloudUploader, cloud: &PointCloud) -> Result<UploadedCloud, RenderError> {
+    let radii = vec![even_radius(cloud); cloud.n_points()];
+    uploader.upload(cloud.positions(), None, &radii, None)
+}
+
+/// Uploads oriented points in the tree's preorder, for [`Scene::show_document`]. O(n); in any thread.
+///
+/// # Errors
+/// [`RenderError`] when the graphics adapter cannot hold them.
+pub fn upload_oriented(
+    uploader: &CloudUploader,
+    cloud: &PointCloud,
+    propagation: &Propagation,
+) -> Result<UploadedCloud, RenderError> {
+    uploader.upload(
+        cloud.positions(),
+        Some(&propagation.normals),
+        &propagation.splat_radii,
+        Some(propagation.tree.order()),
+    )
 }
 
 /// A radius that roughly closes a surface of the bounding box's size, until neighbors are known.

@@ -5,8 +5,10 @@ use std::sync::Arc;
 
 use normend_core::{Document, Parameters, PointCloud, Propagation};
 use normend_io::{ReadError, Scan, WriteError, WriteOptions};
+use normend_render::{CloudUploader, UploadedCloud};
 
 use crate::job::{Job, JobError, JobStatus};
+use crate::scene_sync::{upload_oriented, upload_points};
 use crate::session::Session;
 
 /// Where a scan comes from.
@@ -35,17 +37,26 @@ impl ScanOrigin {
     }
 }
 
+/// A result with its picture's points, already on the GPU. `None` when there is no GPU or it had no room beside the
+/// present cloud.
+pub struct Uploaded<T> {
+    /// The result.
+    pub result: T,
+    /// Its points.
+    pub cloud: Option<UploadedCloud>,
+}
+
 /// The running job with what is needed when it ends.
 pub enum Work {
     /// A scan is read.
     Open {
         /// The reading.
-        job: Job<Scan>,
+        job: Job<Uploaded<Scan>>,
         /// Where from.
         origin: ScanOrigin,
     },
     /// The open scan is oriented.
-    Propagate(Job<Propagation>),
+    Propagate(Job<Uploaded<Propagation>>),
     /// The open scan is written.
     Export {
         /// The writing.
@@ -59,28 +70,41 @@ pub enum Work {
 
 impl Work {
     /// Starts to read a scan.
-    pub fn open(ctx: &egui::Context, origin: ScanOrigin) -> Self {
+    pub fn open(ctx: &egui::Context, origin: ScanOrigin, uploader: Option<CloudUploader>) -> Self {
         let source = origin.clone();
         let job = Job::start(ctx, "open", "Reading", move |progress| {
             let scan = match &source {
                 ScanOrigin::File(path) => normend_io::read(path, progress),
                 ScanOrigin::Sample => normend_io::read_bytes(SAMPLE.to_vec(), SAMPLE_NAME, progress),
             };
-            scan.map_err(|error| match error {
+            let scan = scan.map_err(|error| match error {
                 ReadError::Cancelled(_) => JobError::Cancelled,
                 error => JobError::Failed(error.to_string()),
-            })
+            })?;
+            let cloud = uploader.and_then(|uploader| upload_points(&uploader, &scan.cloud).ok());
+            Ok(Uploaded { result: scan, cloud })
         });
         Self::Open { job, origin }
     }
 
     /// Starts to orient `document` with `parameters`.
-    pub fn propagate(ctx: &egui::Context, document: &Document, parameters: Parameters) -> Self {
+    pub fn propagate(
+        ctx: &egui::Context,
+        document: &Document,
+        parameters: Parameters,
+        uploader: Option<CloudUploader>,
+    ) -> Self {
         let cloud: Arc<PointCloud> = Arc::clone(document.cloud());
         let given = document.given_normals().cloned();
         Self::Propagate(Job::start(ctx, "propagate", "Finding neighbors", move |progress| {
             let given = given.as_ref().map(|normals| normals.as_slice());
-            Ok(Propagation::new(&cloud, given, parameters, progress)?)
+            let propagation = Propagation::new(&cloud, given, parameters, progress)?;
+            progress.stage("Sending to the graphics adapter");
+            let uploaded = uploader.and_then(|uploader| upload_oriented(&uploader, &cloud, &propagation).ok());
+            Ok(Uploaded {
+                result: propagation,
+                cloud: uploaded,
+            })
         }))
     }
 

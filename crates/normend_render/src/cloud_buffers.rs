@@ -136,7 +136,7 @@ pub fn chunk_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
 }
 
 impl CloudBuffers {
-    /// Uploads a cloud in chunks of at most `max_chunk_points`; all signs are 0. Adds the bytes uploaded to `uploaded`.
+    /// Uploads a cloud in chunks of at most `max_chunk_points`; all signs are 0. Returns the bytes uploaded too.
     ///
     /// # Errors
     /// [`RenderError`] for slices that do not belong together and clouds past the adapter's limits.
@@ -145,8 +145,7 @@ impl CloudBuffers {
         layout: &wgpu::BindGroupLayout,
         cloud: CloudSlices<'_>,
         max_chunk_points: usize,
-        uploaded: &mut u64,
-    ) -> Result<Self, RenderError> {
+    ) -> Result<(Self, u64), RenderError> {
         cloud.check()?;
         let n_points = cloud.positions.len();
         let limits = device.limits();
@@ -213,15 +212,15 @@ impl CloudBuffers {
                 n_points: (end - first) as u32,
             });
         }
-        *uploaded += bytes;
-        Ok(Self {
+        let buffers = Self {
             chunks,
             turned,
             turned_buffer,
             n_points: n_points as u32,
             max_radius,
             bounds,
-        })
+        };
+        Ok((buffers, bytes))
     }
 
     /// The sign bits on the GPU.

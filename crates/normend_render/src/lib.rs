@@ -26,4 +26,4 @@ pub use error::RenderError;
 pub use headless::HeadlessDevice;
 pub use marks::Sphere;
 pub use pick::{Hit, PickRequest};
-pub use renderer::SplatRenderer;
+pub use renderer::{CloudUploader, SplatRenderer, UploadedCloud};

@@ -39,6 +39,43 @@ impl Drawn {
     }
 }
 
+/// Uploads clouds for one renderer, in any thread.
+#[derive(Clone, Debug)]
+pub struct CloudUploader {
+    device: wgpu::Device,
+    layout: wgpu::BindGroupLayout,
+    max_chunk_points: usize,
+}
+
+/// A cloud on the GPU, to be handed to [`SplatRenderer::show_cloud`].
+pub struct UploadedCloud {
+    buffers: CloudBuffers,
+    bytes: u64,
+}
+
+impl CloudUploader {
+    /// Packs and uploads a cloud; arguments and errors are those of [`SplatRenderer::set_cloud`]. O(n), parallel.
+    ///
+    /// # Errors
+    /// As [`SplatRenderer::set_cloud`].
+    pub fn upload(
+        &self,
+        positions: &[Vec3],
+        normals: Option<&[Vec3]>,
+        radii: &[f32],
+        order: Option<&[u32]>,
+    ) -> Result<UploadedCloud, RenderError> {
+        let slices = CloudSlices {
+            positions,
+            normals,
+            radii,
+            order,
+        };
+        let (buffers, bytes) = CloudBuffers::new(&self.device, &self.layout, slices, self.max_chunk_points)?;
+        Ok(UploadedCloud { buffers, bytes })
+    }
+}
+
 /// Draws a cloud of oriented disc splats into its own texture.
 pub struct SplatRenderer {
     chunk_layout: wgpu::BindGroupLayout,
@@ -161,21 +198,26 @@ impl SplatRenderer {
         // The old buffers go first, so that both need not fit at once.
         self.clear_cloud();
         self.set_highlight(device, queue, &[]);
-        let slices = CloudSlices {
-            positions,
-            normals,
-            radii,
-            order,
-        };
-        let cloud = CloudBuffers::new(
-            device,
-            &self.chunk_layout,
-            slices,
-            self.max_chunk_points,
-            &mut self.bytes_uploaded,
-        )?;
-        self.cloud = Some(cloud);
+        let cloud = self.uploader(device).upload(positions, normals, radii, order)?;
+        self.show_cloud(device, queue, cloud);
         Ok(())
+    }
+
+    /// Uploads clouds for this renderer from other threads, while it goes on drawing the present one.
+    pub fn uploader(&self, device: &wgpu::Device) -> CloudUploader {
+        CloudUploader {
+            device: device.clone(),
+            layout: self.chunk_layout.clone(),
+            max_chunk_points: self.max_chunk_points,
+        }
+    }
+
+    /// Draws `cloud` from now on, with all signs 0 and nothing highlighted. It comes from [`Self::uploader`]. O(1).
+    pub fn show_cloud(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, cloud: UploadedCloud) {
+        self.clear_cloud();
+        self.set_highlight(device, queue, &[]);
+        self.bytes_uploaded += cloud.bytes;
+        self.cloud = Some(cloud.buffers);
     }
 
     /// Draws no cloud from now on.
