@@ -41,7 +41,8 @@ pub struct Regions {
     tree: Arc<SpanningTree>,
     /// Roots and initial cuts.
     initial_tops: FixedBitSet,
-    initially_turned: FixedBitSet,
+    /// The signs without any source.
+    initial_orientation: Orientation,
     /// The tops of all regions: [`Self::initial_tops`] and the cuts between sources.
     tops: PositionSet,
     /// The position of the source of each region that has one, by the region's top.
@@ -66,10 +67,10 @@ impl Regions {
     /// and initial cuts) those in `initially_turned` start with their stored normal turned.
     pub fn new(tree: Arc<SpanningTree>, initial_cuts: FixedBitSet, initially_turned: FixedBitSet) -> Self {
         let n_points = tree.n_points();
-        let mut initial_tops = initial_cuts;
+        let (mut initial_tops, mut turned) = (initial_cuts, initially_turned);
         initial_tops.grow(n_points);
+        turned.grow(n_points);
         let mut tops = PositionSet::new(n_points);
-        let mut turned = FixedBitSet::with_capacity(n_points);
         for position in 0..n_points as u32 {
             let index = position as usize;
             match tree.parent(position) {
@@ -80,14 +81,13 @@ impl Regions {
                 _ => {
                     initial_tops.insert(index);
                     tops.insert(position);
-                    turned.set(index, initially_turned.contains(index));
                 }
             }
         }
         Self {
             tree,
             initial_tops,
-            initially_turned,
+            initial_orientation: Orientation::new(turned.clone()),
             tops,
             source_by_top: BTreeMap::new(),
             orientation: Orientation::new(turned),
@@ -158,16 +158,9 @@ impl Regions {
         Change::from_flips(&flips)
     }
 
-    /// Whether the stored normal of `point` is turned when there is no source: by the default sign of its base region.
+    /// Whether the stored normal of `point` is turned when there is no source: by the default sign of its base region. O(1).
     pub fn starts_turned(&self, point: u32) -> bool {
-        let position = self.tree.position(point);
-        let mut top = position;
-        while !self.initial_tops.contains(top as usize)
-            && let Some(parent) = self.tree.parent(top)
-        {
-            top = parent;
-        }
-        self.initially_turned.contains(top as usize) ^ self.tree.phi(top) ^ self.tree.phi(position)
+        self.initial_orientation.is_turned(self.tree.position(point))
     }
 
     /// Whether `a` and `b` are in one region.
@@ -276,7 +269,7 @@ impl Regions {
             .min_by(|&a, &b| self.tree.compare_edges(a, b));
         // A cut between sources is no root, so it has a parent.
         let Some((cut, parent)) = lightest.and_then(|cut| Some((cut, self.tree.parent(cut)?))) else {
-            if self.orientation.is_turned(top) != self.initially_turned.contains(top as usize) {
+            if self.orientation.is_turned(top) != self.initial_orientation.is_turned(top) {
                 self.flip(top, flips);
             }
             return;
