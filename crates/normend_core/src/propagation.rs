@@ -140,7 +140,8 @@ pub struct Propagation {
 
 impl Propagation {
     /// Runs neighbors → normals → graph → tree → initial cuts. `given` are the file's normals by point, if it has any
-    /// (zero or NaN where a point has none); without them [`Start::Keep`] is the same as [`Start::Estimate`].
+    /// (zero or NaN where a point has none); without one that can be used [`Start::Keep`] is the same as
+    /// [`Start::Estimate`].
     ///
     /// # Errors
     /// [`Cancelled`] when `progress` asks to stop; nothing else.
@@ -152,7 +153,10 @@ impl Propagation {
     ) -> Result<Self, Cancelled> {
         let k_normals = clamp(parameters.k_normals, Parameters::K_NORMALS);
         let k_graph = clamp(parameters.k_graph, Parameters::K_GRAPH);
-        let given = given.filter(|_| parameters.start == Start::Keep).map(GivenNormals::new);
+        let given = given
+            .filter(|_| parameters.start == Start::Keep)
+            .map(GivenNormals::new)
+            .filter(|given| !given.missing.is_full());
         let mut clock = Clock::start();
 
         progress.stage("Finding neighbors");

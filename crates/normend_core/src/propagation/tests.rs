@@ -112,6 +112,11 @@ fn keep_without_given_normals_estimates() {
     let estimated = propagate(&cloud, None, Start::Estimate);
     assert_eq!(kept.normals, estimated.normals);
     assert_eq!(kept.base_regions.orientation(), estimated.base_regions.orientation());
+    // Neither do given normals of which none can be used change anything.
+    let useless = vec![Vec3::ZERO; 100];
+    let kept = propagate(&cloud, Some(&useless), Start::Keep);
+    assert_eq!(kept.default_sources, estimated.default_sources);
+    assert_eq!(kept.base_regions.orientation(), estimated.base_regions.orientation());
     // With the other start, given normals don't count.
     let given = vec![Vec3::X; 100];
     let ignored = propagate(&cloud, Some(&given), Start::Estimate);
