@@ -24,7 +24,7 @@ mod save;
 
 use std::ffi::OsStr;
 use std::fmt;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -154,8 +154,8 @@ fn read_file(path: &Path, progress: &dyn Progress) -> Result<Vec<u8>, ReadError>
         path: path.to_owned(),
         source,
     };
-    let mut file = File::open(path).map_err(fail)?;
-    let metadata = file.metadata().map_err(fail)?;
+    // Before it is opened: opening a pipe waits until somebody writes into it.
+    let metadata = fs::metadata(path).map_err(fail)?;
     if metadata.is_dir() {
         return Err(fail(io::ErrorKind::IsADirectory.into()));
     }
@@ -164,6 +164,7 @@ fn read_file(path: &Path, progress: &dyn Progress) -> Result<Vec<u8>, ReadError>
             "this is a device or a pipe, not a file: save it as a file first",
         )));
     }
+    let mut file = File::open(path).map_err(fail)?;
     let n_bytes = metadata.len();
     let mut bytes = Vec::new();
     let n_reserved = usize::try_from(n_bytes).map_err(|_| fail(io::ErrorKind::OutOfMemory.into()))?;
