@@ -8,6 +8,7 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 use normend_core::{Cancelled, Progress, Silent};
 use normend_io::{FileFormat, Positions, Scan, WriteError, WriteOptions, read, read_bytes, write_points};
+use proptest::prelude::*;
 
 fn scan(name: &str, content: impl AsRef<[u8]>) -> Scan {
     read_bytes(content.as_ref().to_vec(), name, &Silent).unwrap()
@@ -291,6 +292,73 @@ fn text_keeps_its_separators_comments_and_columns() {
         &normals,
         "Church, north side nx ny nz\n1 2 3 1 0 0\n4 5 6 0 0 -1\n",
     );
+}
+
+/// A line of values; `inserted` come after the column `last`.
+fn line(values: &[String], separator: &str, last: usize, inserted: &[&str]) -> String {
+    let mut all: Vec<&str> = values.iter().map(String::as_str).collect();
+    all.splice(last + 1..last + 1, inserted.iter().copied());
+    all.join(separator)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn texts_of_any_shape_keep_it(
+        separator in prop::sample::select(vec![" ", "\t", ",", ";", " , ", "  "]),
+        line_end in prop::sample::select(vec!["\n", "\r\n", "\r"]),
+        columns in prop::sample::subsequence(vec!["red", "Label"], 0..=2)
+            .prop_map(|others| [&["x", "Y", "z"], &others[..]].concat())
+            .prop_shuffle(),
+        names_after in prop::option::of(prop::sample::select(vec!["", "//", "# "])),
+        has_count in any::<bool>(),
+        between in prop::collection::vec(prop::sample::select(vec!["", "# by hand", "// half", "NO LINE"]), 12),
+        points in prop::collection::vec((0_u8..99, 0_u8..99, 0_u8..99), 1..8),
+        ends_open in any::<bool>(),
+    ) {
+        // Without names the coordinates come first.
+        let columns = if names_after.is_some() { columns } else { vec!["x", "Y", "z", "red"] };
+        let last = columns.iter().rposition(|name| ["x", "Y", "z"].contains(name)).unwrap();
+        let names: Vec<String> = columns.iter().map(|name| (*name).to_owned()).collect();
+        let new_names = if columns[last] == "Y" { ["Nx", "Ny", "Nz"] } else { ["nx", "ny", "nz"] };
+        let mut lines = Vec::new();
+        if has_count {
+            lines.push([points.len().to_string(), points.len().to_string()]);
+        }
+        if let Some(mark) = names_after {
+            let [without, with] = [&[][..], &new_names].map(|new| line(&names, separator, last, new));
+            lines.push([format!("{mark}{without}"), format!("{mark}{with}")]);
+        }
+        for &(x, y, z) in &points {
+            let value = |name: &&str| match *name {
+                "x" => format!("{x}.50"),
+                "Y" => y.to_string(),
+                "z" => format!("-{z}"),
+                _ => "7".to_owned(),
+            };
+            let values: Vec<String> = columns.iter().map(value).collect();
+            lines.push([&[][..], &["0", "-1", "0"]].map(|new| line(&values, separator, last, new)));
+        }
+        let [mut input, mut expect] = [String::new(), String::new()];
+        for (index, [before, after]) in lines.iter().enumerate() {
+            for (text, own) in [(&mut input, before), (&mut expect, after)] {
+                if between[index] != "NO LINE" {
+                    text.push_str(between[index]);
+                    text.push_str(line_end);
+                }
+                text.push_str(own);
+                if !(ends_open && index + 1 == lines.len()) {
+                    text.push_str(line_end);
+                }
+            }
+        }
+        let scan = scan("scan.txt", &input);
+        let expect_points = points.iter().map(|&(x, y, z)| DVec3::new(f64::from(x) + 0.5, y.into(), -f64::from(z)));
+        prop_assert_eq!(self::points(&scan), expect_points.collect::<Vec<_>>());
+        let out = written(&scan, &vec![Vec3::NEG_Y; points.len()], "out.txt");
+        prop_assert_eq!(String::from_utf8(out).unwrap(), expect);
+    }
 }
 
 /// Rows are read and written in parts, by as many threads as there are.
