@@ -197,7 +197,6 @@ impl SplatRenderer {
     ) -> Result<(), RenderError> {
         // The old buffers go first, so that both need not fit at once.
         self.clear_cloud();
-        self.set_highlight(device, queue, &[]);
         let cloud = self.uploader(device).upload(positions, normals, radii, order)?;
         self.show_cloud(device, queue, cloud);
         Ok(())
