@@ -67,12 +67,15 @@ impl Derived {
 
     /// The default source that is vouched for together with a mend at an existing point: another point of its region, which
     /// has no source yet.
-    fn default_source_beside(&self, point: u32) -> Option<u32> {
+    fn default_source_beside(&self, point: u32, sources: &Sources) -> Option<u32> {
         let position = self.propagation.tree.position(point);
         let component = self.propagation.tree.roots().partition_point(|&root| root <= position) - 1;
         let &default = self.propagation.default_sources.get(component)?;
-        let is_beside =
-            default != point && self.regions.source_of(point).is_none() && self.regions.in_one_region(default, point);
+        // After the first mend the default source is a source itself, which spares the climbs up the tree.
+        let is_beside = default != point
+            && !sources.contains(default)
+            && self.regions.source_of(point).is_none()
+            && self.regions.in_one_region(default, point);
         is_beside.then_some(default)
     }
 
@@ -198,7 +201,7 @@ impl Document {
         self.check_point(point)?;
         Ok(derived
             .regions
-            .preview_beside(point, derived.default_source_beside(point)))
+            .preview_beside(point, derived.default_source_beside(point, &self.sources)))
     }
 
     /// What `Edit::TurnWhole(point)` would turn, without changing anything.
@@ -299,7 +302,7 @@ impl Document {
                 let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
                 self.check_point(point)?;
                 let mut changes = vec![change(point, Some(derived.mended(point)))];
-                if let Some(default) = derived.default_source_beside(point) {
+                if let Some(default) = derived.default_source_beside(point, &self.sources) {
                     let normal = derived.oriented_normal(default);
                     let source = Source {
                         point: default,
