@@ -27,7 +27,10 @@ pub enum PointCloudError {
         point: usize,
     },
     /// More points than ids (`u32`).
-    #[error("{n_points} points are more than the 4 294 967 294 that Normend can number: split the scan")]
+    #[error(
+        "{n_points} points are more than the {} that Normend can number: split the scan",
+        PointCloud::MAX_POINTS
+    )]
     TooMany {
         /// How many there are.
         n_points: usize,
@@ -41,6 +44,9 @@ pub enum PointCloudError {
 }
 
 impl PointCloud {
+    /// The most points that ids (`u32`) can number; `u32::MAX` stays free for "no point".
+    pub const MAX_POINTS: usize = u32::MAX as usize - 1;
+
     /// Checks `positions` (relative to `origin`) and takes them. O(n).
     ///
     /// # Errors
@@ -142,8 +148,7 @@ impl PointCloud {
 const EXTENTS: RangeInclusive<f64> = 1e-15..=1e15;
 
 fn check_count(n_points: usize) -> Result<(), PointCloudError> {
-    // u32::MAX stays free for "no point".
-    if n_points < u32::MAX as usize {
+    if n_points <= PointCloud::MAX_POINTS {
         Ok(())
     } else {
         Err(PointCloudError::TooMany { n_points })

@@ -34,9 +34,6 @@ pub(crate) fn next_token(bytes: &[u8], at: usize) -> Option<Span> {
     })
 }
 
-/// Most points that have ids.
-pub(crate) const MOST_ROWS: usize = u32::MAX as usize - 1;
-
 /// Names of the six values of a row that are read, in the order of [`Spans`].
 pub(crate) const VALUE_NAMES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 

@@ -4,10 +4,10 @@
 //! names and the counts of PTS files are kept as they are. Without column names, columns 4 to 6 are normals only when
 //! there are exactly six and they have unit length.
 
-use normend_core::Progress;
+use normend_core::{PointCloud, Progress};
 
 use crate::error::{Broken, Place, Stop, quoted};
-use crate::table::{Layout, MOST_ROWS, Rows, Span, Spans, Starts, Table, VALUE_NAMES, find_parts, is_space};
+use crate::table::{Layout, Rows, Span, Spans, Starts, Table, VALUE_NAMES, find_parts, is_space};
 use crate::value::{ValueType, parse};
 
 /// Rows looked at to tell normals from colors.
@@ -53,7 +53,7 @@ pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<XyzLayout, S
         .normal_order
         .sort_unstable_by_key(|component| layout.columns[3 + component]);
     let mut rows = XyzRows::new(&layout, bytes, start);
-    let (starts, n_rows, end) = find_parts(&mut rows, MOST_ROWS + 1, bytes.len(), progress)?;
+    let (starts, n_rows, end) = find_parts(&mut rows, PointCloud::MAX_POINTS + 1, bytes.len(), progress)?;
     if let Some((announced, line)) = rows.missing() {
         return Err(Broken::new(
             line,
@@ -64,9 +64,10 @@ pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<XyzLayout, S
     if n_rows == 0 {
         return Err(Broken::whole("the file has no points: open one that has").into());
     }
-    if n_rows > MOST_ROWS {
+    if n_rows > PointCloud::MAX_POINTS {
         return Err(Broken::whole(format!(
-            "more than the {MOST_ROWS} points that Normend can number: split the scan"
+            "more than the {} points that Normend can number: split the scan",
+            PointCloud::MAX_POINTS
         ))
         .into());
     }

@@ -6,14 +6,14 @@
 mod header;
 mod rows;
 
-use normend_core::Progress;
+use normend_core::{PointCloud, PointCloudError, Progress};
 use ply_rs::ply::Encoding;
 
 pub(crate) use self::header::sniff;
 use self::header::{Element, Header, Kind};
 use self::rows::{FixedRows, WalkedRows, skip_element};
 use crate::error::{Broken, Place, Stop, quoted};
-use crate::table::{Layout, MOST_ROWS, Rows, Span, Starts, Table, VALUE_NAMES, find_parts, is_space};
+use crate::table::{Layout, Rows, Span, Starts, Table, VALUE_NAMES, find_parts, is_space};
 use crate::value::Scalar;
 
 /// A PLY file whose parts are known.
@@ -117,14 +117,11 @@ fn find_vertex(header: &Header) -> Result<usize, Broken> {
             "the file has no points: open one that has",
         ));
     }
-    if element.count > MOST_ROWS {
-        return Err(Broken::new(
-            Place::Line(element.line),
-            format!(
-                "{} points are more than the {MOST_ROWS} that Normend can number: split the scan",
-                element.count
-            ),
-        ));
+    if element.count > PointCloud::MAX_POINTS {
+        let too_many = PointCloudError::TooMany {
+            n_points: element.count,
+        };
+        return Err(Broken::new(Place::Line(element.line), too_many.to_string()));
     }
     Ok(vertex)
 }
