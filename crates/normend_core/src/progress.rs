@@ -10,7 +10,7 @@ pub struct Cancelled;
 
 /// Receives how far a long function has come, and may stop it.
 pub trait Progress: Sync {
-    /// Reports `fraction` of the work done, in 0..=1. Called from any thread, some hundred times a job.
+    /// Reports `fraction` of the work done, in 0..=1. Called from any thread and often, so it should be cheap.
     ///
     /// # Errors
     /// [`Cancelled`] when the work should stop.
