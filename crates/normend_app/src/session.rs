@@ -87,14 +87,14 @@ impl Session {
         self.selected.retain(|&point| sources.get(point).is_some());
     }
 
-    /// The rule that decided the sides, for the exported file's comment.
-    pub fn rule(&self) -> String {
-        let start = self.document.parameters().rule(self.scan.given_normals.is_some());
-        match self.document.sources().len() {
+    /// The rule that decided the sides, for the exported file's comment; `None` before the first propagation.
+    pub fn rule(&self) -> Option<String> {
+        let start = self.document.propagation()?.rule();
+        Some(match self.document.sources().len() {
             0 => start.to_owned(),
             1 => format!("{start}, 1 source"),
             n_sources => format!("{start}, {n_sources} sources"),
-        }
+        })
     }
 
     /// Where an export goes unless the user says otherwise: `<name>_oriented.ply` in `folder`, or beside the scan.

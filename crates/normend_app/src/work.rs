@@ -113,7 +113,7 @@ impl Work {
         let normals = session.document.oriented_normals()?;
         let scan = Arc::clone(&session.scan);
         let options = WriteOptions {
-            rule: session.rule(),
+            rule: session.rule()?,
             overwrite_input,
         };
         let target = path.to_path_buf();

@@ -68,14 +68,6 @@ impl Parameters {
 
     /// What [`Self::k_graph`] can be; a value outside counts as the nearest one inside.
     pub const K_GRAPH: RangeInclusive<usize> = 1..=200;
-
-    /// The rule that decides the sides where no source does, in words for files: "as given", "farthest along +z up".
-    pub fn rule(&self, has_given_normals: bool) -> &'static str {
-        match self.start {
-            Start::Keep if has_given_normals => "as given",
-            Start::Keep | Start::Estimate => "farthest along +z up",
-        }
-    }
 }
 
 impl Default for Parameters {
@@ -213,6 +205,15 @@ impl Propagation {
 }
 
 impl Propagation {
+    /// The rule that decides the sides where no source does, in words for files: "as given", "farthest along +z up".
+    pub fn rule(&self) -> &'static str {
+        if self.default_sources.is_empty() {
+            "as given"
+        } else {
+            "farthest along +z up"
+        }
+    }
+
     /// `n` oriented normals by point as they are before any source: those that a document without sources shows. O(n).
     pub fn initial_normals(&self) -> Vec<Vec3> {
         let orientation = self.base_regions.orientation();

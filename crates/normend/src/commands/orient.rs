@@ -227,7 +227,7 @@ fn orient(job: &Job, parameters: Parameters, overwrite: bool, bar: &Bar) -> anyh
     let sources = propagation.base_regions.n_base_regions();
 
     let signs_started = Instant::now();
-    let rule = parameters.rule(scan.given_normals.is_some());
+    let rule = propagation.rule();
     let mut document = Document::new(scan.cloud.clone(), scan.given_normals.clone());
     document.install(propagation);
     let normals = document.oriented_normals().ok_or(EditError::NotReady)?;
