@@ -418,8 +418,8 @@ fn from_one_format_to_another() {
         written(&scan, &normals, "out.TXT"),
         b"1.500 2 3 1 0 0\n-4e1 5 6 0 0 -1\n"
     );
-    // A name without a known extension does not change the format.
-    assert!(written(&scan, &normals, "out.bak").starts_with(b"ply\nformat ascii"));
+    // A name without an extension does not change the format.
+    assert!(written(&scan, &normals, "out").starts_with(b"ply\nformat ascii"));
 
     let check = |text: &str, type_name: &str, n_bytes: usize| {
         let scan = read_bytes(text.as_bytes().to_vec(), "scan.xyz", &Silent).unwrap();
@@ -563,6 +563,37 @@ fn cancelling_leaves_everything_as_it_was() {
     assert!(matches!(error, WriteError::Cancelled(_)));
     assert_eq!(fs::read(&output).unwrap(), b"old");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+}
+
+#[test]
+fn a_name_must_not_promise_a_format_that_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("scan.dat");
+    fs::write(&input, "1 2 3\n").unwrap();
+    let scan = read(&input, &Silent).unwrap();
+    let refused = |error: WriteError, target: &Path| {
+        let expect = format!(
+            "{} cannot be written: Normend writes .ply .xyz .txt .asc .pts .csv; choose a name that ends with one of these",
+            target.display()
+        );
+        assert_eq!(error.to_string(), expect);
+        assert!(!target.exists());
+    };
+    for name in ["out.obj", "out.las", "out.ply.bak"] {
+        let target = folder.path().join(name);
+        refused(
+            scan.write(&[Vec3::X], &target, &options(), &Silent).unwrap_err(),
+            &target,
+        );
+        let points = Positions::Float(&[Vec3::X]);
+        refused(write_points(&target, points, None, &Silent).unwrap_err(), &target);
+    }
+    // No extension, or the one that the input has, promises nothing else.
+    for name in ["out", "out.dat"] {
+        let target = folder.path().join(name);
+        scan.write(&[Vec3::X], &target, &options(), &Silent).unwrap();
+        assert_eq!(fs::read(&target).unwrap(), b"1 2 3 1 0 0\n");
+    }
 }
 
 #[test]

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use normend_core::Cancelled;
 
+use crate::FileFormat;
+
 /// Why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
@@ -39,6 +41,12 @@ pub enum WriteError {
     /// The target is the file that was read.
     #[error("{} is the file that was read: choose another name, or allow it to be written over", path.display())]
     OverInput {
+        /// The target.
+        path: PathBuf,
+    },
+    /// The target's name promises a format that is not written.
+    #[error("{} cannot be written: Normend writes {}; choose a name that ends with one of these", path.display(), written())]
+    Extension {
         /// The target.
         path: PathBuf,
     },
@@ -179,6 +187,13 @@ pub(crate) fn quoted(bytes: &[u8]) -> String {
     let shown = String::from_utf8_lossy(&bytes[..bytes.len().min(LONGEST)]);
     let dots = if bytes.len() > LONGEST { "…" } else { "" };
     format!("\"{}{dots}\"", shown.escape_debug())
+}
+
+/// The extensions that can be written, in words.
+fn written() -> String {
+    let extensions = FileFormat::ALL.iter().flat_map(|format| format.extensions());
+    let dotted: Vec<String> = extensions.map(|extension| format!(".{extension}")).collect();
+    dotted.join(" ")
 }
 
 fn io_words(error: &io::Error) -> String {

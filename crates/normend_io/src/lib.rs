@@ -79,6 +79,20 @@ impl FileFormat {
             .into_iter()
             .find(|format| format.extensions().contains(&extension.as_str()))
     }
+
+    /// The format in which `path` would be written: the one that its extension names; `None`, the input's format, when it
+    /// has no extension or that of `input`.
+    ///
+    /// # Errors
+    /// [`WriteError::Extension`]: a file must not look like what it is not.
+    pub fn of_target(path: &Path, input: Option<&Path>) -> Result<Option<Self>, WriteError> {
+        let format = Self::of_path(path);
+        let extension = path.extension();
+        if format.is_some() || extension.is_none() || extension == input.and_then(Path::extension) {
+            return Ok(format);
+        }
+        Err(WriteError::Extension { path: path.to_owned() })
+    }
 }
 
 /// A scan as it was read: the points, and the file itself so that it can be written again with other normals.
@@ -272,8 +286,8 @@ impl Scan {
     }
 
     /// Writes the file that came in with `normals` (unit, by point of the cloud) to `path`: beside it first, synced,
-    /// renamed. The format is that of `path`'s extension when it names one, else the input's; to another format than the
-    /// input's go positions and normals only. A row that is no point keeps the normal it has, or gets `0 0 1`.
+    /// renamed. The format is that of `path`'s extension, or the input's ([`FileFormat::of_target`]); to another format than
+    /// the input's go positions and normals only. A row that is no point keeps the normal it has, or gets `0 0 1`.
     ///
     /// # Errors
     /// [`WriteError`]; the target is as it was then.
@@ -285,6 +299,7 @@ impl Scan {
         progress: &dyn Progress,
     ) -> Result<(), WriteError> {
         progress.stage("Writing");
+        let format = FileFormat::of_target(path, self.path().map(PathBuf::as_path))?.unwrap_or(self.format);
         check_normals(normals, self.cloud.n_points())?;
         if !options.overwrite_input && self.path().is_some_and(|input| save::is_same_file(input, path)) {
             return Err(WriteError::OverInput { path: path.to_owned() });
@@ -292,7 +307,6 @@ impl Scan {
         let layout = self.file.layout.as_layout();
         let bytes = &self.file.bytes[..];
         let row_normals = RowNormals::new(normals, self.rows.as_ref().map(|rows| rows.as_slice()));
-        let format = FileFormat::of_path(path).unwrap_or(self.format);
         let comment = comment(&options.rule);
         save::replace(path, |out| {
             let io = WriteError::io(path);
@@ -367,7 +381,7 @@ pub enum Positions<'a> {
 }
 
 /// Writes a fresh cloud, with `n` unit normals or without, as [`Scan::write`] does: binary little-endian PLY, or text
-/// when the extension says so. A file that is there is replaced.
+/// when the extension says so ([`FileFormat::of_target`]). A file that is there is replaced.
 ///
 /// # Errors
 /// [`WriteError`]; the target is as it was then.
@@ -378,6 +392,7 @@ pub fn write_points(
     progress: &dyn Progress,
 ) -> Result<(), WriteError> {
     progress.stage("Writing");
+    let format = FileFormat::of_target(path, None)?;
     let n_points = match positions {
         Positions::Float(positions) => positions.len(),
         Positions::Double(positions) => positions.len(),
@@ -401,7 +416,7 @@ pub fn write_points(
     save::replace(path, |out| {
         let io = WriteError::io(path);
         let mut write = |bytes: &[u8]| out.write_all(bytes).map_err(&io);
-        match FileFormat::of_path(path) {
+        match format {
             Some(FileFormat::Xyz) => file.write_text(&mut write, progress),
             Some(FileFormat::Ply) | None => file.write_ply(&mut write, progress),
         }
