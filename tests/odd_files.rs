@@ -447,6 +447,55 @@ fn from_one_format_to_another() {
 }
 
 #[test]
+fn text_from_another_format_has_what_its_extension_asks_for() {
+    let positions = [
+        DVec3::new(0.1, -2.0, 3e-9),
+        DVec3::new(f64::NAN, 1.0, 1.0),
+        DVec3::new(4.5, 4_500_000.001, 1.0 / 3.0),
+    ];
+    let normals = [
+        Vec3::new(0.6, 0.0, -0.8),
+        Vec3::X,
+        Vec3::new(1.0 / 3.0, 2.0 / 3.0, -2.0 / 3.0),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("scan.ply");
+    write_points(&source, Positions::Double(&positions), None, &Silent).unwrap();
+    let scan = read(&source, &Silent).unwrap();
+    let finite = [normals[0], normals[2]];
+    let check = |name: &str, first_line: &str, separator: &str| {
+        let text = String::from_utf8(written(&scan, &finite, name)).unwrap();
+        let rows = text.strip_prefix(first_line).unwrap();
+        assert_eq!(rows.lines().count(), 3, "{text}");
+        for row in rows.lines() {
+            assert_eq!(row.split(separator).count(), 6, "{text}");
+        }
+        let again = read_bytes(text.into_bytes(), name, &Silent).unwrap();
+        assert_eq!((again.format, again.n_left_out), (FileFormat::Xyz, 1));
+        assert_eq!(points(&again), points(&scan), "{name}");
+        assert_eq!(again.given_normals.unwrap()[..], finite, "{name}");
+
+        // The same of a cloud that comes from no file.
+        let fresh = folder.path().join(name);
+        write_points(&fresh, Positions::Double(&positions), Some(&normals), &Silent).unwrap();
+        let text = fs::read_to_string(&fresh).unwrap();
+        assert!(text.starts_with(first_line), "{text}");
+        let again = read(&fresh, &Silent).unwrap();
+        assert_eq!(points(&again), points(&scan), "{name}");
+        assert_eq!(again.given_normals.unwrap()[..], finite, "{name}");
+        write_points(&fresh, Positions::Double(&positions), None, &Silent).unwrap();
+        let again = read(&fresh, &Silent).unwrap();
+        assert_eq!(points(&again), points(&scan), "{name}");
+        assert!(again.given_normals.is_none(), "{name}");
+    };
+    check("out.csv", "x,y,z,nx,ny,nz\n", ",");
+    check("out.PTS", "3\n", " ");
+    for name in ["out.xyz", "out.txt", "out.asc"] {
+        check(name, "", " ");
+    }
+}
+
+#[test]
 fn fresh_clouds() {
     let folder = tempfile::tempdir().unwrap();
     let positions = [Vec3::new(0.1, 2.0, 3.0), Vec3::new(4.0, 5.0, -6e-9)];

@@ -36,7 +36,7 @@ use rayon::prelude::*;
 
 pub use error::{Broken, Place, ReadError, WriteError};
 
-use crate::new_file::{NewFile, narrowest};
+use crate::new_file::{NewFile, TextStyle, narrowest};
 use crate::ply::PlyLayout;
 use crate::rewrite::{RowNormals, rewrite, write_text};
 use crate::table::{Layout, Values, read_values};
@@ -287,7 +287,8 @@ impl Scan {
 
     /// Writes the file that came in with `normals` (unit, by point of the cloud) to `path`: beside it first, synced,
     /// renamed. The format is that of `path`'s extension, or the input's ([`FileFormat::of_target`]); to another format than
-    /// the input's go positions and normals only. A row that is no point keeps the normal it has, or gets `0 0 1`.
+    /// the input's go positions and normals only, in text with what the extension asks for: names and commas in `.csv`, the
+    /// number of points in `.pts`. A row that is no point keeps the normal it has, or gets `0 0 1`.
     ///
     /// # Errors
     /// [`WriteError`]; the target is as it was then.
@@ -328,7 +329,14 @@ impl Scan {
                     &mut write,
                     progress,
                 ),
-                (_, FileFormat::Xyz) => write_text(layout, bytes, row_normals, &mut write, progress),
+                (_, FileFormat::Xyz) => write_text(
+                    layout,
+                    bytes,
+                    TextStyle::of_path(path),
+                    row_normals,
+                    &mut write,
+                    progress,
+                ),
                 (_, FileFormat::Ply) => {
                     let positions = read_values(layout, bytes, &Part::new(progress, 0.0..0.5))?.positions;
                     let file = NewFile {
@@ -417,7 +425,7 @@ pub fn write_points(
         let io = WriteError::io(path);
         let mut write = |bytes: &[u8]| out.write_all(bytes).map_err(&io);
         match format {
-            Some(FileFormat::Xyz) => file.write_text(&mut write, progress),
+            Some(FileFormat::Xyz) => file.write_text(TextStyle::of_path(path), &mut write, progress),
             Some(FileFormat::Ply) | None => file.write_ply(&mut write, progress),
         }
     })

@@ -1,5 +1,7 @@
 //! Files of points that are not a copy of the file that came in.
 
+use std::path::Path;
+
 use glam::{DVec3, Vec3};
 use normend_core::Progress;
 use rayon::prelude::*;
@@ -7,8 +9,48 @@ use rayon::prelude::*;
 use crate::error::WriteError;
 use crate::ply;
 use crate::rewrite::{NO_NORMAL, RowNormals, push_normal};
-use crate::table::{PART_ROWS, for_each_part};
+use crate::table::{PART_ROWS, VALUE_NAMES, for_each_part};
 use crate::value::{Scalar, ValueType, push_number};
+
+/// How a text is laid out that is no copy of a text, by what programs expect of its extension.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum TextStyle {
+    /// `.xyz` and the like: values with spaces between them, nothing else.
+    Plain,
+    /// `.pts`: the number of points first.
+    Pts,
+    /// `.csv`: the names of the columns first, and commas.
+    Csv,
+}
+
+impl TextStyle {
+    pub fn of_path(path: &Path) -> Self {
+        let has = |name: &str| {
+            path.extension()
+                .is_some_and(|extension| extension.eq_ignore_ascii_case(name))
+        };
+        if has("csv") {
+            Self::Csv
+        } else if has("pts") {
+            Self::Pts
+        } else {
+            Self::Plain
+        }
+    }
+
+    pub fn separator(self) -> u8 {
+        if self == Self::Csv { b',' } else { b' ' }
+    }
+
+    /// What stands before the rows.
+    pub fn head(self, n_rows: usize, has_normals: bool) -> String {
+        match self {
+            Self::Plain => String::new(),
+            Self::Pts => format!("{n_rows}\n"),
+            Self::Csv => VALUE_NAMES[..if has_normals { 6 } else { 3 }].join(",") + "\n",
+        }
+    }
+}
 
 /// Points to be written, in order.
 pub(crate) struct NewFile<'a> {
@@ -49,20 +91,22 @@ impl NewFile<'_> {
     /// Writes text, a point a line: `x y z [nx ny nz]`.
     pub fn write_text(
         &self,
+        style: TextStyle,
         write: &mut dyn FnMut(&[u8]) -> Result<(), WriteError>,
         progress: &dyn Progress,
     ) -> Result<(), WriteError> {
+        let separator = style.separator();
+        write(style.head(self.n_points, self.normals.is_some()).as_bytes())?;
         self.write_rows(
             |position, normal, out| {
                 for (axis, coordinate) in position.to_array().into_iter().enumerate() {
                     if axis > 0 {
-                        out.push(b' ');
+                        out.push(separator);
                     }
                     push_number(coordinate, self.coordinates == Scalar::Float, out);
                 }
                 if let Some(normal) = normal {
-                    out.push(b' ');
-                    push_normal(normal, out);
+                    push_normal(normal, separator, out);
                 }
                 out.push(b'\n');
             },

@@ -4,6 +4,7 @@ use glam::Vec3;
 use normend_core::Progress;
 
 use crate::error::{Stop, WriteError};
+use crate::new_file::TextStyle;
 use crate::table::{Layout, Part, Span, Spans, for_each_part};
 use crate::value::{Scalar, ValueType, push_number};
 
@@ -178,15 +179,17 @@ impl Change {
     }
 }
 
-/// Writes `x y z nx ny nz` for each row, in text: a text's coordinates as they are, others as short as they read back.
+/// Writes `x y z nx ny nz` for each row, in text of this style: a text's coordinates as they are, others as short as they read back.
 pub(crate) fn write_text(
     layout: &dyn Layout,
     bytes: &[u8],
+    style: TextStyle,
     normals: RowNormals<'_>,
     write: &mut dyn FnMut(&[u8]) -> Result<(), WriteError>,
     progress: &dyn Progress,
 ) -> Result<(), WriteError> {
     let table = layout.table();
+    write(style.head(table.n_rows, true).as_bytes())?;
     let make = |index: usize, out: &mut Vec<u8>| -> Result<(), WriteError> {
         let part = table.part(index);
         let mut rows = layout.rows(bytes, part.bytes.start);
@@ -194,7 +197,10 @@ pub(crate) fn write_text(
             let Some(spans) = rows.next_row().map_err(Stop::from)? else {
                 break;
             };
-            for (value_type, span) in table.types.iter().zip(&spans).take(3) {
+            for (axis, (value_type, span)) in table.types.iter().zip(&spans).take(3).enumerate() {
+                if axis > 0 {
+                    out.push(style.separator());
+                }
                 match value_type {
                     ValueType::Text => out.extend_from_slice(span.of(bytes)),
                     ValueType::LittleEndian(scalar) | ValueType::BigEndian(scalar) => {
@@ -202,9 +208,8 @@ pub(crate) fn write_text(
                         push_number(value, *scalar == Scalar::Float, out);
                     }
                 }
-                out.push(b' ');
             }
-            push_normal(normal.unwrap_or(NO_NORMAL), out);
+            push_normal(normal.unwrap_or(NO_NORMAL), style.separator(), out);
             out.push(b'\n');
         }
         Ok(())
@@ -212,12 +217,10 @@ pub(crate) fn write_text(
     for_each_part(table.n_parts(), progress, make, write)
 }
 
-/// Appends a normal in text.
-pub(crate) fn push_normal(normal: Vec3, out: &mut Vec<u8>) {
-    for (component, value) in normal.to_array().into_iter().enumerate() {
-        if component > 0 {
-            out.push(b' ');
-        }
+/// Appends a normal in text, with `separator` before each component.
+pub(crate) fn push_normal(normal: Vec3, separator: u8, out: &mut Vec<u8>) {
+    for value in normal.to_array() {
+        out.push(separator);
         ValueType::Text.write(value, out);
     }
 }
