@@ -65,6 +65,8 @@ pub struct Scene {
     /// Points of the source spheres, in the renderer's order.
     source_points: Vec<u32>,
     geometry: Option<Geometry>,
+    /// Side of the squares of screen pixels that the last picture has one pixel for.
+    pixel_side: u32,
     picture_id: u64,
     ids_version: u64,
     /// The ids that the last picture was drawn with.
@@ -81,6 +83,7 @@ impl Scene {
             tree: None,
             source_points: Vec::new(),
             geometry: None,
+            pixel_side: 1,
             picture_id: 0,
             ids_version: 0,
             drawn_ids_version: 0,
@@ -189,14 +192,19 @@ impl Scene {
         self.ids_version += 1;
     }
 
-    /// Draws if anything changed and returns the picture for egui. `size` in physical pixels.
+    /// Draws if anything changed and returns the picture for egui. `size` in physical pixels; the picture has one pixel for
+    /// each square of `pixel_side` of them.
     pub fn draw(
         &mut self,
         camera: &Camera,
         size: [u32; 2],
+        pixel_side: u32,
         pixels_per_point: f32,
         settings: &DrawSettings,
     ) -> Option<TextureId> {
+        let size = size.map(|len| len.div_ceil(pixel_side));
+        let pixels_per_point = pixels_per_point / pixel_side as f32;
+        self.pixel_side = pixel_side;
         let geometry = Geometry {
             camera: *camera,
             size,
@@ -219,7 +227,11 @@ impl Scene {
         self.drawn_ids_version = self.ids_version;
         let (view, version) = self.renderer.picture()?;
         let mut egui_renderer = self.state.renderer.write();
-        let filter = wgpu::FilterMode::Nearest;
+        let filter = if pixel_side == 1 {
+            wgpu::FilterMode::Nearest
+        } else {
+            wgpu::FilterMode::Linear
+        };
         let id = match self.texture {
             Some((id, shown)) if shown == version => id,
             Some((id, _)) => {
@@ -248,6 +260,7 @@ impl Scene {
         if self.drawn_ids_version != self.ids_version {
             return None;
         }
+        let pixel = pixel.map(|place| place / self.pixel_side);
         self.renderer.pick(&self.state.device, &self.state.queue, pixel)
     }
 

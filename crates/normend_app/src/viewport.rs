@@ -11,6 +11,9 @@ use crate::scene_sync::Scene;
 /// A pixel of the view, physical, from its top left corner.
 pub type Pixel = [u32; 2];
 
+/// Points that framing looks at.
+const FRAMED_POINTS: usize = 1 << 18;
+
 /// The camera and how the user moves it.
 #[derive(Clone, Debug)]
 pub struct Viewport {
@@ -24,6 +27,8 @@ pub struct Viewport {
     /// The point that zooming keeps in place, for as long as the pointer rests.
     zoom_anchor: Option<(Pos2, Vec3)>,
     pace: Pace,
+    /// How far the present drag has come, in points.
+    dragged: Vec2,
 }
 
 /// What the pointer did in the view this frame.
@@ -54,6 +59,7 @@ impl Viewport {
             id: None,
             zoom_anchor: None,
             pace: Pace::new(),
+            dragged: Vec2::ZERO,
         }
     }
 
@@ -64,12 +70,15 @@ impl Viewport {
         self.camera = Camera::framing(min, max, StandardView::Corner, self.aspect());
         self.camera.projection = projection;
         self.zoom_anchor = None;
+        self.frame_all(cloud);
     }
 
     /// Shows the whole scan from the present direction.
     pub fn frame_all(&mut self, cloud: &PointCloud) {
-        let (min, max) = cloud.bounding_box();
-        self.camera.frame(min, max, self.aspect());
+        // A part of very many points shows their outline as well as all, and a key must not wait.
+        let step = cloud.n_points().div_ceil(FRAMED_POINTS).max(1);
+        let points = cloud.positions().iter().copied().step_by(step);
+        self.camera.frame_points(points, self.aspect());
     }
 
     /// Brings `point` into the middle, at most `distance` away.
@@ -160,9 +169,16 @@ impl Viewport {
         if let Some(secs) = self.pace.frame(moved, response.dragged(), now, frame_secs) {
             ui.request_repaint_after(std::time::Duration::from_secs_f64(secs));
         }
-        settings.stride = self.pace.stride();
+        let detail = self.pace.detail();
+        settings.stride = detail.stride;
 
-        if let Some(texture) = scene.draw(&self.camera, self.size, self.pixels_per_point, settings) {
+        if let Some(texture) = scene.draw(
+            &self.camera,
+            self.size,
+            detail.pixel_side,
+            self.pixels_per_point,
+            settings,
+        ) {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(texture, self.rect, whole, Color32::WHITE);
         }
@@ -172,7 +188,7 @@ impl Viewport {
         self.axis_gizmo(ui);
 
         let position = response.hover_pos();
-        let resting = !moved && !response.dragged() && self.pace.stride() == 1;
+        let resting = !moved && !response.dragged() && self.pace.is_full();
         let clicked_at = response
             .interact_pointer_pos()
             .and_then(|position| self.pixel(position));
@@ -196,7 +212,10 @@ impl Viewport {
         under_pointer: Option<Vec3>,
     ) {
         let shift = ui.input(|input| input.modifiers.shift);
-        let delta = response.drag_delta() * self.pixels_per_point;
+        // From the whole way: in a slow frame the pointer may have moved before the drag was known to be one.
+        let dragged = response.total_drag_delta().unwrap_or_default();
+        let delta = (dragged - self.dragged) * self.pixels_per_point;
+        self.dragged = dragged;
         let pixels = glam::Vec2::new(delta.x, delta.y);
         let panning = response.dragged_by(PointerButton::Secondary)
             || response.dragged_by(PointerButton::Middle)

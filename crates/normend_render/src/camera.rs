@@ -6,7 +6,7 @@
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
 use glam::camera::rh::proj::directx;
-use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
+use glam::{BVec3, Mat3, Mat4, Vec2, Vec3, Vec4};
 
 /// Radians that the view turns per pixel of an orbiting drag.
 const RADIANS_PER_PIXEL: f32 = 0.006;
@@ -160,29 +160,45 @@ impl Camera {
 
     /// Moves so that the box is framed, keeping the direction. A box that is empty or not finite changes nothing.
     pub fn frame(&mut self, min: Vec3, max: Vec3, aspect: f32) {
-        let half = 0.5 * (max - min);
-        if !half.is_finite() || half.min_element() < 0.0 {
+        if min.cmple(max).all() {
+            let corner = |bits: u32| {
+                let pick = |bit: u32| bits >> bit & 1 == 1;
+                Vec3::select(BVec3::new(pick(0), pick(1), pick(2)), max, min)
+            };
+            self.frame_points([0, 1, 2, 3, 4, 5, 6, 7].map(corner), aspect);
+        }
+    }
+
+    /// Moves so that `points` fill the picture from edge to edge, keeping the direction; the pivot goes to the middle of their
+    /// box. No points, or points that are not finite, change nothing. O(n).
+    pub fn frame_points(&mut self, points: impl IntoIterator<Item = Vec3> + Clone, aspect: f32) {
+        let empty = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let (min, max) = points
+            .clone()
+            .into_iter()
+            .fold(empty, |(min, max), point| (min.min(point), max.max(point)));
+        let center = min + 0.5 * (max - min);
+        if !(min.is_finite() && max.is_finite() && center.is_finite()) {
             return;
         }
-        let center = min + half;
+        // All points must be on the inner side of the four planes through the eye and the picture's edges. In view space
+        // around the center, with the eye at (x, y, d): x_i - x <= slope (d - z_i) and x - x_i <= slope (d - z_i).
         let tan_y = (0.5 * self.field_of_view).tan();
-        let tan_x = tan_y * aspect;
+        let slope = Vec2::new(tan_y * aspect, tan_y);
         let rotation = self.view_rotation();
-        let mut distance: f32 = 0.0;
-        for corner in 0..8 {
-            let sign = |bit: u32| if corner >> bit & 1 == 0 { -1.0 } else { 1.0 };
-            let in_view = rotation * (half * Vec3::new(sign(0), sign(1), sign(2)));
-            let toward_eye = if self.projection == Projection::Perspective {
-                in_view.z
-            } else {
-                0.0
+        let (mut low, mut high) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
+        for point in points {
+            let in_view = rotation * (point - center);
+            let nearer = match self.projection {
+                Projection::Perspective => slope * in_view.z,
+                Projection::Orthographic => Vec2::ZERO,
             };
-            distance = distance
-                .max(in_view.x.abs() / tan_x + toward_eye)
-                .max(in_view.y.abs() / tan_y + toward_eye);
+            low = low.min(in_view.truncate() - nearer);
+            high = high.max(in_view.truncate() + nearer);
         }
+        let distance = (0.5 * (high - low) / slope).max_element();
         self.pivot = center;
-        self.pivot_offset = Vec2::ZERO;
+        self.pivot_offset = -0.5 * (low + high);
         self.distance = if distance > 0.0 {
             limit_distance(distance * FRAME_MARGIN, center)
         } else {
@@ -441,6 +457,27 @@ mod tests {
                 prop_assert!(seen.cmpge(Vec2::ZERO).all() && seen.cmple(SIZE).all(), "corner {corner} at {seen}");
             }
         }
+
+        #[test]
+        fn framed_points_fill_the_picture_from_edge_to_edge(
+            camera in cameras(),
+            points in prop::collection::vec(prop::array::uniform3(-9.0_f32..9.0).prop_map(Vec3::from_array), 2..20),
+        ) {
+            let mut camera = camera;
+            camera.frame_points(points.iter().copied(), SIZE.x / SIZE.y);
+            let seen = points.iter().map(|&point| camera.project(point, SIZE).unwrap());
+            let empty = (Vec2::INFINITY, Vec2::NEG_INFINITY);
+            let (min, max) = seen.fold(empty, |(min, max), pixel| (min.min(pixel), max.max(pixel)));
+            prop_assert!(min.cmpge(Vec2::ZERO).all() && max.cmple(SIZE).all(), "{min} {max}");
+            // Without the margin, two of them touch opposite edges. In perspective the eye may have to stand in one of them.
+            camera.distance /= FRAME_MARGIN;
+            let (min, max) = points
+                .iter()
+                .filter_map(|&point| camera.project(point, SIZE))
+                .fold(empty, |(min, max), pixel| (min.min(pixel), max.max(pixel)));
+            let fills = ((max - min) / SIZE).max_element() > 0.99;
+            prop_assert!(fills || camera.projection == Projection::Perspective, "{min} {max}");
+        }
     }
 
     #[test]
@@ -458,6 +495,34 @@ mod tests {
         check(StandardView::Bottom, Vec3::NEG_Z, Vec3::NEG_Y);
         let corner = Camera::framing(Vec3::splat(-1.0), Vec3::splat(1.0), StandardView::Corner, 1.0);
         assert!(corner.back().distance(Vec3::new(1.0, -1.0, 1.0) / 3.0_f32.sqrt()) < 1e-6);
+    }
+
+    #[test]
+    fn framing_centers_what_is_seen_not_the_box() {
+        // A pyramid: from the corner, its box reaches far above its tip's sides.
+        let points = [
+            Vec3::ZERO,
+            Vec3::X,
+            Vec3::Y,
+            Vec3::new(1.0, 1.0, 0.0),
+            Vec3::new(0.5, 0.5, 1.5),
+        ];
+        let mut camera = Camera::framing(
+            Vec3::ZERO,
+            Vec3::new(1.0, 1.0, 1.5),
+            StandardView::Corner,
+            SIZE.x / SIZE.y,
+        );
+        camera.frame_points(points, SIZE.x / SIZE.y);
+        let seen = points.map(|point| camera.project(point, SIZE).unwrap());
+        let (min, max) = seen.iter().fold((SIZE, Vec2::ZERO), |(min, max), &pixel| {
+            (min.min(pixel), max.max(pixel))
+        });
+        let above_and_below = [min.y, SIZE.y - max.y];
+        assert!(
+            above_and_below.iter().all(|&room| room > 5.0 && room < 0.06 * SIZE.y),
+            "{above_and_below:?}"
+        );
     }
 
     #[test]

@@ -11,7 +11,7 @@ use normend_core::progress::Part;
 use normend_core::{Document, EditError, Parameters, Progress, Propagation, Start};
 use normend_render::{Camera, DrawSettings, HeadlessDevice, Palette, SplatRenderer};
 
-use super::{Outcome, is_same_file, prepare, title_of, wrong_use};
+use super::{Outcome, check_is_file_name, check_may_write, is_same_file, prepare, title_of, wrong_use};
 use crate::arguments::RenderArguments;
 use crate::console::Bar;
 
@@ -94,6 +94,7 @@ impl PaletteName {
 /// # Errors
 /// Wrong use, a scan that cannot be read, no graphics driver, a picture that cannot be written; Ctrl-C.
 pub fn run(arguments: &RenderArguments) -> anyhow::Result<Outcome> {
+    check_is_file_name(&arguments.output)?;
     if is_same_file(&arguments.input, &arguments.output) {
         return Err(wrong_use(
             "the picture would take the place of the scan: name another output",
@@ -108,6 +109,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<Outcome> {
             "pictures are PNG files: let the name of the output end with .png",
         ));
     }
+    check_may_write(&arguments.output, arguments.overwrite)?;
     prepare(&arguments.common)?;
     // Before the work, so that a missing driver costs no time.
     let graphics = Graphics::open()?;
@@ -180,7 +182,9 @@ impl Graphics {
             .map(|propagation| &propagation.splat_radii)
             .ok_or(EditError::NotReady)?;
         let (min, max) = cloud.bounding_box();
-        let camera = Camera::framing(min, max, arguments.view, width as f32 / height as f32);
+        let aspect = width as f32 / height as f32;
+        let mut camera = Camera::framing(min, max, arguments.view, aspect);
+        camera.frame_points(cloud.positions().iter().copied(), aspect);
         let settings = DrawSettings {
             mode: arguments.mode,
             palette: arguments.palette.palette(),
