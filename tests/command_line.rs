@@ -154,8 +154,16 @@ fn orient_makes_every_normal_right_on_closed_shapes() {
                 .is_none()
         );
         for estimator in ["pca", "wpca", "obne"] {
-            run(&folder, &format!("orient scan.ply -o out.ply --estimator {estimator}")).expect(0);
-            assert_eq!(n_wrong(&folder, "out.ply", "truth.ply"), 0, "{shape} by {estimator}");
+            run(
+                &folder,
+                &format!("orient scan.ply -o {estimator}.ply --estimator {estimator}"),
+            )
+            .expect(0);
+            assert_eq!(
+                n_wrong(&folder, &format!("{estimator}.ply"), "truth.ply"),
+                0,
+                "{shape} by {estimator}"
+            );
         }
     }
 }
@@ -295,6 +303,16 @@ fn wrong_use_is_refused_before_anything_is_written() {
     check("orient a.ply sub/a.ply -o out", &["two inputs", "one by one"]);
     check("orient a.ply -o out.ply --json a.ply", &["--json"]);
     check("orient a.ply -o out.ply --json out.ply", &["--json"]);
+    for name in ["out.obj", "out.las", "out.png"] {
+        check(&format!("orient a.ply -o {name}"), &[name, ".ply", ".xyz"]);
+        check(&format!("generate sphere -o {name}"), &[name, ".ply", ".xyz"]);
+    }
+    check("generate sphere -o out.ply --truth truth.obj", &["truth.obj", ".ply"]);
+    check("orient a.ply -o -", &["standard output", "name of a file"]);
+    check("orient a.ply sub/b.ply -o -", &["standard output", "name of a file"]);
+    check("generate sphere -o -", &["standard output", "name of a file"]);
+    check("render a.ply -o -", &["standard output", "name of a file"]);
+    check("orient a.ply sub/b.ply -o single.ply", &["single.ply", "folder"]);
     check("orient a.ply -o out.ply --estimator best", &["pca", "wpca", "obne"]);
     check("orient a.ply -o out.ply --k-normals 2", &["3"]);
     check("orient a.ply -o out.ply --threads 0", &["1"]);
@@ -306,6 +324,84 @@ fn wrong_use_is_refused_before_anything_is_written() {
     check("generate sphere -o out.ply --truth out.ply", &["same file"]);
     check("generate sphere -o out.ply --noise=-1", &["from 0 to 1"]);
     check("generate sphere -o out.ply --noise NaN", &["from 0 to 1"]);
+}
+
+#[test]
+fn wrong_use_is_told_with_the_usage_of_its_command() {
+    let folder = folder();
+    fs::write(folder.path().join("a.ply"), ply_of(&sphere(300))).unwrap();
+    let check = |typed: &str, words: &[&str]| {
+        let refused = run(&folder, typed).expect(2);
+        for word in words {
+            assert!(refused.err.contains(word), "{typed}: no {word:?} in {}", refused.err);
+        }
+    };
+    check(
+        "orient a.ply -o a.ply",
+        &["Usage: normend orient [OPTIONS] --output <OUT> <IN>"],
+    );
+    check("render a.ply -o a.jpg", &["Usage: normend render"]);
+    check("generate torus -o a.obj", &["Usage: normend generate"]);
+    check("a.ply extra", &["opens one scan", "Usage: normend ["]);
+    check("a.ply orient", &["opens one scan", "command comes before"]);
+    check("frob", &["no file and no command", "'frob'", "Usage: normend ["]);
+}
+
+#[test]
+fn an_output_without_an_extension_has_the_format_of_the_input() {
+    let folder = folder();
+    fs::write(folder.path().join("scan.dat"), ply_of(&sphere(300))).unwrap();
+    for output in ["out", "out.dat"] {
+        run(&folder, &format!("orient scan.dat -o {output}")).expect(0);
+        assert!(fs::read(folder.path().join(output)).unwrap().starts_with(b"ply\n"));
+    }
+    // A folder may be called as anything, when that is plain.
+    run(&folder, "orient scan.dat -o all.ply/").expect(0);
+    assert_eq!(names_in(&folder.path().join("all.ply")), ["scan.dat"]);
+}
+
+#[test]
+fn a_file_that_exists_is_replaced_only_when_asked() {
+    let folder = folder();
+    for name in ["a.ply", "b.ply"] {
+        fs::write(folder.path().join(name), ply_of(&sphere(300))).unwrap();
+    }
+    fs::create_dir(folder.path().join("out")).unwrap();
+    let old = ["out.ply", "out.jsonl", "out.png", "truth.ply", "out/a.ply"];
+    let check = |typed: &str, name: &str| {
+        for name in old {
+            fs::write(folder.path().join(name), "old").unwrap();
+        }
+        let refused = run(&folder, typed).expect(1);
+        refused.expect_sentence(&[name, "exists already", "--overwrite"]);
+        for name in old {
+            let content = fs::read_to_string(folder.path().join(name)).unwrap();
+            assert_eq!(content, "old", "{typed}: {name}");
+        }
+    };
+    check("orient a.ply -o out.ply", "out.ply");
+    check("orient a.ply -o new.ply --json out.jsonl", "out.jsonl");
+    check("generate sphere -o out.ply --points 300", "out.ply");
+    check("generate sphere -o new.ply --truth truth.ply --points 300", "truth.ply");
+    check("render a.ply -o out.png", "out.png");
+    check("orient a.ply b.ply -o out --quiet", "a.ply");
+    let exists = |name: &str| folder.path().join(name).exists();
+    assert!(
+        !exists("new.ply"),
+        "nothing is written before all names are known to be free"
+    );
+    assert!(exists("out/b.ply"), "the others are oriented all the same");
+
+    for typed in [
+        "orient a.ply -o out.ply --json out.jsonl --overwrite",
+        "orient a.ply b.ply -o out --overwrite",
+        "generate sphere -o out.ply --truth truth.ply --points 300 --overwrite",
+    ] {
+        run(&folder, typed).expect(0);
+    }
+    for name in old.into_iter().filter(|name| *name != "out.png") {
+        assert_ne!(fs::read(folder.path().join(name)).unwrap(), b"old", "{name}");
+    }
 }
 
 #[test]
@@ -375,7 +471,7 @@ fn quiet_says_nothing_and_words_go_to_standard_error() {
     let told = run(&folder, "orient scan.ply -o out.ply").expect(0);
     assert!(told.out.is_empty());
     told.expect_sentence(&["scan.ply", "1,200 points", "1 component", "out.ply"]);
-    let quiet = run(&folder, "orient scan.ply -o out.ply --quiet").expect(0);
+    let quiet = run(&folder, "orient scan.ply -o out.ply --quiet --overwrite").expect(0);
     assert!(quiet.out.is_empty() && quiet.err.is_empty(), "{}", quiet.err);
 }
 

@@ -1,9 +1,11 @@
 //! What can be typed: the one table of commands and flags, which gives the parser and the help.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand};
+use clap::error::{ContextKind, ErrorKind};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use normend_core::shapes::ShapeKind;
 use normend_core::{EdgeRule, Estimator, Parameters, Start};
 use normend_render::{DisplayMode, StandardView};
@@ -44,6 +46,32 @@ pub struct Arguments {
     pub scan: Option<PathBuf>,
 }
 
+impl Arguments {
+    /// What was typed. Help, version and wrong use end the program here.
+    pub fn of_program() -> Self {
+        Self::try_parse().unwrap_or_else(|error| {
+            // The parser takes the second name for a command and speaks of that.
+            let is_second_scan =
+                error.kind() == ErrorKind::ArgumentConflict && error.get(ContextKind::InvalidSubcommand).is_some();
+            if is_second_scan {
+                usage_error(None, "the editor opens one scan, and a command comes before all else").exit()
+            }
+            error.exit()
+        })
+    }
+}
+
+/// An error with the usage of the command called `name`, or of the program.
+pub fn usage_error(name: Option<&str>, sentence: impl fmt::Display) -> clap::Error {
+    let mut program = Arguments::command();
+    // Else commands do not know that their names begin with the program's.
+    program.build();
+    match name.and_then(|name| program.find_subcommand_mut(name)) {
+        Some(command) => command.error(ErrorKind::ValueValidation, sentence),
+        None => program.error(ErrorKind::ValueValidation, sentence),
+    }
+}
+
 /// The commands that run without a window.
 #[derive(Debug, Subcommand)]
 pub enum Command {
@@ -55,6 +83,18 @@ pub enum Command {
     Render(RenderArguments),
     /// Write a generated scan whose normals are known
     Generate(GenerateArguments),
+}
+
+impl Command {
+    /// The name that is typed.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Orient(_) => "orient",
+            Self::Check(_) => "check",
+            Self::Render(_) => "render",
+            Self::Generate(_) => "generate",
+        }
+    }
 }
 
 /// Flags of every command.
@@ -109,7 +149,11 @@ impl From<PropagationArguments> for Parameters {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The output is the file that came in, points in its order, with unit normals nx ny nz. Several inputs go to a folder \
-under their own names; an input that cannot be read does not stop the others, the exit code is 1 then.
+under their own names; one that fails does not stop the others, the exit code is 1 then. A file that exists is replaced \
+only with --overwrite.
+
+The output's extension says its format; without one, or with the input's, it is the input's. From .ply to text (.xyz .txt \
+.asc .pts .csv) or back go positions and normals only.
 
 The report (--json) has a line for each input: an object with input, output, points, left_out (rows without finite \
 coordinates), components, sources (places where signs start), parameters, seconds (read, neighbors, normals, graph, \
@@ -138,7 +182,7 @@ pub struct OrientArguments {
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
 
-    /// Allow the output to take the place of an input
+    /// Allow the output to replace a file that exists, an input too
     #[arg(long)]
     pub overwrite: bool,
 
@@ -179,7 +223,9 @@ pub struct CheckArguments {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Normals of the file are drawn as they are; points without normals get oriented ones first, as `normend orient` gives \
-them. No display is needed, only a graphics driver, which may be software (Mesa's lavapipe).
+them. No display is needed, only a graphics driver, which may be software (Mesa's lavapipe; where XDG_RUNTIME_DIR is not \
+set, Mesa itself complains of that on standard error, and draws all the same). A picture that exists is replaced only with \
+--overwrite.
 
 Examples:
   normend render oriented.ply -o picture.png
@@ -208,6 +254,10 @@ pub struct RenderArguments {
     #[arg(long, value_name = "NAME", value_parser = one_of(&PaletteName::ALL, PaletteName::name), default_value = PaletteName::default().name())]
     pub palette: PaletteName,
 
+    /// Allow the picture to replace a file that exists
+    #[arg(long)]
+    pub overwrite: bool,
+
     /// What every command takes.
     #[command(flatten)]
     pub common: CommonArguments,
@@ -217,7 +267,7 @@ pub struct RenderArguments {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The scan has positions only; --truth writes the same points with their exact outward normals, to check a result \
-against.
+against. Files that exist are replaced only with --overwrite.
 
 Examples:
   normend generate torus -o torus.ply --truth torus_truth.ply --points 100000
@@ -228,7 +278,7 @@ pub struct GenerateArguments {
     #[arg(value_parser = one_of(&ShapeKind::ALL, ShapeKind::name))]
     pub shape: ShapeKind,
 
-    /// File to write: .ply or .xyz
+    /// File to write: .ply, .xyz, .csv, …
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
 
@@ -252,6 +302,10 @@ pub struct GenerateArguments {
     /// Number that the noise follows from
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+
+    /// Allow the outputs to replace files that exist
+    #[arg(long)]
+    pub overwrite: bool,
 
     /// What every command takes.
     #[command(flatten)]
@@ -280,7 +334,6 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_table_of_flags_is_consistent() {

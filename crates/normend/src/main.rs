@@ -11,31 +11,40 @@ mod commands;
 mod console;
 mod memory;
 
-use std::io;
+use std::io::{self, IsTerminal};
+use std::path::Path;
 use std::process::ExitCode;
 
-use clap::Parser;
 use tracing_subscriber::EnvFilter;
 
 use arguments::{Arguments, Command};
-use commands::{Outcome, check, generate, orient, render};
+use commands::{Outcome, WrongUse, check, generate, orient, render, wrong_use};
 
 /// The exit code of a program that was interrupted, by the shells' convention: 128 + SIGINT.
 const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = Arguments::of_program();
     start_log();
+    let name = arguments.command.as_ref().map(Command::name);
     match run(arguments) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Failed) => ExitCode::FAILURE,
-        Err(error) => exit_code_of(&error),
+        Err(error) => exit_code_of(&error, name),
     }
 }
 
 fn run(arguments: Arguments) -> anyhow::Result<Outcome> {
     match arguments.command {
         None => {
+            if let Some(scan) = &arguments.scan
+                && is_mistyped_command(scan)
+            {
+                return Err(wrong_use(format!(
+                    "there is no file and no command of the name '{}'",
+                    scan.display()
+                )));
+            }
             normend_app::run(arguments.scan)?;
             Ok(Outcome::Done)
         }
@@ -46,10 +55,15 @@ fn run(arguments: Arguments) -> anyhow::Result<Outcome> {
     }
 }
 
-/// Says what went wrong, once, and gives the exit code for it.
-fn exit_code_of(error: &anyhow::Error) -> ExitCode {
-    if let Some(wrong_use) = error.downcast_ref::<clap::Error>() {
-        wrong_use.exit();
+/// Whether a scan that does not exist looks like a command: one word without an extension.
+fn is_mistyped_command(scan: &Path) -> bool {
+    scan.extension().is_none() && scan.components().count() == 1 && !scan.exists()
+}
+
+/// Says what went wrong, once, and gives the exit code for it; `name` is the command's.
+fn exit_code_of(error: &anyhow::Error, name: Option<&str>) -> ExitCode {
+    if let Some(wrong_use) = error.downcast_ref::<WrongUse>() {
+        arguments::usage_error(name, wrong_use).exit();
     }
     // The reader of our output closed it (`normend check … | head -1`): it has what it wanted.
     let is_broken_pipe = |cause: &(dyn std::error::Error + 'static)| {
@@ -69,12 +83,16 @@ fn exit_code_of(error: &anyhow::Error) -> ExitCode {
 }
 
 /// Diagnostics for developers on standard error, chosen by `RUST_LOG`; by default warnings and errors, and of the window
-/// system only errors, because it warns of every display that is not quite usual.
+/// system only errors, because it warns of every display that is not quite usual. What the editor's window says is not
+/// said again. In color only for people: on a terminal, unless `NO_COLOR` is set.
 fn start_log() {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn,winit=error"));
+    let filter = EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| EnvFilter::new("warn,winit=error,normend_app::messages=off"));
+    let is_colored = io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(io::stderr)
+        .with_ansi(is_colored)
         .without_time()
         .init();
 }

@@ -4,7 +4,7 @@ use normend_core::progress::Part;
 use normend_core::{Progress, shapes::Shape};
 use normend_io::{Positions, write_points};
 
-use super::{Outcome, prepare, title_of, wrong_use};
+use super::{Outcome, check_may_write, check_scan_name, prepare, title_of, wrong_use};
 use crate::arguments::GenerateArguments;
 use crate::console::{Bar, counted};
 
@@ -17,6 +17,13 @@ pub fn run(arguments: &GenerateArguments) -> anyhow::Result<Outcome> {
         return Err(wrong_use(
             "--truth and --output name the same file: give one of them another name",
         ));
+    }
+    for output in [Some(&arguments.output), arguments.truth.as_ref()]
+        .into_iter()
+        .flatten()
+    {
+        check_scan_name(output, None)?;
+        check_may_write(output, arguments.overwrite)?;
     }
     prepare(&arguments.common)?;
     let bar = Bar::new(&title_of(&arguments.output), arguments.common.quiet);

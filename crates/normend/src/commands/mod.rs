@@ -5,13 +5,13 @@ pub mod generate;
 pub mod orient;
 pub mod render;
 
+use std::fmt;
 use std::path::Path;
 
-use anyhow::Context;
-use clap::CommandFactory;
-use clap::error::ErrorKind;
+use anyhow::{Context, bail};
+use normend_io::FileFormat;
 
-use crate::arguments::{Arguments, CommonArguments};
+use crate::arguments::CommonArguments;
 use crate::console;
 
 /// How a command ended when nothing stopped it.
@@ -38,9 +38,48 @@ fn prepare(common: &CommonArguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// An error of wrong use: clap's sentence with the usage, and exit code 2.
-fn wrong_use(sentence: impl std::fmt::Display) -> anyhow::Error {
-    Arguments::command().error(ErrorKind::ValueValidation, sentence).into()
+/// Wrong use that the parser cannot see, in words. The program says it with the usage of the command; exit code 2.
+#[derive(Debug)]
+pub struct WrongUse(String);
+
+impl fmt::Display for WrongUse {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for WrongUse {}
+
+/// An error of wrong use.
+pub fn wrong_use(sentence: impl fmt::Display) -> anyhow::Error {
+    WrongUse(sentence.to_string()).into()
+}
+
+/// Refuses the name of standard output for a file.
+fn check_is_file_name(output: &Path) -> anyhow::Result<()> {
+    if output == Path::new("-") {
+        return Err(wrong_use(
+            "the output cannot go to standard output (-): give -o the name of a file",
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses, before the work, a name for a scan whose extension promises another format than is written.
+fn check_scan_name(output: &Path, input: Option<&Path>) -> anyhow::Result<()> {
+    check_is_file_name(output)?;
+    FileFormat::of_target(output, input).map(drop).map_err(wrong_use)
+}
+
+/// Refuses, before the work, to replace a file that nobody allowed to replace.
+fn check_may_write(output: &Path, overwrite: bool) -> anyhow::Result<()> {
+    if !overwrite && output.is_file() {
+        bail!(
+            "{} exists already: name another output, or allow it to be replaced with --overwrite",
+            output.display()
+        );
+    }
+    Ok(())
 }
 
 /// Whether both paths name the same existing file.

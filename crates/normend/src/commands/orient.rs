@@ -12,7 +12,9 @@ use normend_core::{Document, EditError, Parameters, Progress, Propagation, Start
 use normend_io::WriteOptions;
 use serde::{Serialize, Serializer};
 
-use super::{Outcome, is_same_file, prepare, title_of, wrong_use};
+use super::{
+    Outcome, check_is_file_name, check_may_write, check_scan_name, is_same_file, prepare, title_of, wrong_use,
+};
 use crate::arguments::OrientArguments;
 use crate::console::{self, Bar, counted};
 use crate::memory::peak_rss_bytes;
@@ -92,10 +94,13 @@ fn serialize_parameters<S: Serializer>(parameters: &Parameters, serializer: S) -
 pub fn run(arguments: OrientArguments) -> anyhow::Result<Outcome> {
     let Plan { folder, jobs } = plan(&arguments)?;
     prepare(&arguments.common)?;
+    let mut report = match &arguments.json {
+        Some(path) => Some(open_report(path, arguments.overwrite)?),
+        None => None,
+    };
     if let Some(folder) = &folder {
         fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     }
-    let mut report = arguments.json.as_deref().map(open_report).transpose()?;
     let parameters = Parameters::from(arguments.propagation);
     let mut outcome = Outcome::Done;
     for job in &jobs {
@@ -134,11 +139,21 @@ pub fn run(arguments: OrientArguments) -> anyhow::Result<Outcome> {
 /// Wrong use, in words.
 fn plan(arguments: &OrientArguments) -> anyhow::Result<Plan> {
     let output = &arguments.output;
+    check_is_file_name(output)?;
     let is_folder = arguments.inputs.len() > 1 || output.is_dir() || ends_with_separator(output);
     if is_folder && output.exists() && !output.is_dir() {
         return Err(wrong_use(format!(
             "{} is a file, but several inputs need a folder: give -o the name of a folder",
             output.display()
+        )));
+    }
+    // A folder may have any name, but a new one that ends like a file is most likely a slip.
+    if is_folder && !output.is_dir() && !ends_with_separator(output) && output.extension().is_some() {
+        return Err(wrong_use(format!(
+            "{0} is the name of a file, but several inputs need a folder: give -o the name of a folder, or {0}{1} if \
+             this is one",
+            output.display(),
+            std::path::MAIN_SEPARATOR
         )));
     }
     let mut outputs = BTreeSet::new();
@@ -150,6 +165,7 @@ fn plan(arguments: &OrientArguments) -> anyhow::Result<Plan> {
                 .ok_or_else(|| wrong_use(format!("{} is not a file", input.display())))?;
             output.join(name)
         } else {
+            check_scan_name(output, Some(input))?;
             output.clone()
         };
         if !outputs.insert(output.clone()) {
@@ -195,16 +211,18 @@ fn ends_with_separator(path: &Path) -> bool {
 }
 
 /// Standard output for `-`, else a new file; opened before the work, so that a wrong path costs no time.
-fn open_report(path: &Path) -> anyhow::Result<Box<dyn Write>> {
+fn open_report(path: &Path, overwrite: bool) -> anyhow::Result<Box<dyn Write>> {
     if path == Path::new("-") {
         return Ok(Box::new(io::stdout()));
     }
+    check_may_write(path, overwrite)?;
     let file = File::create(path).with_context(|| format!("cannot write the report {}", path.display()))?;
     Ok(Box::new(file))
 }
 
 /// Reads, orients and writes one scan.
 fn orient(job: &Job, parameters: Parameters, overwrite: bool, bar: &Bar) -> anyhow::Result<Oriented> {
+    check_may_write(&job.output, overwrite)?;
     let started = Instant::now();
     let mut seconds = Seconds::default();
 
