@@ -4,6 +4,7 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests fail as tests do, by panicking")]
 
+#[expect(dead_code, reason = "the other tests of the editor use the rest")]
 #[path = "editor/driver.rs"]
 mod driver;
 

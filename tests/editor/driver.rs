@@ -85,6 +85,27 @@ impl Editor {
         self.harness.query_all_by_label_contains(label).next().is_some()
     }
 
+    /// Whether the widget with this label has the keyboard.
+    pub fn is_focused(&self, role: Role, label: &str) -> bool {
+        let mut widgets = self.harness.query_all_by_role_and_label(role, label);
+        widgets.any(|widget| widget.is_focused())
+    }
+
+    /// What stands in the field of the export window; `None` when it is closed.
+    pub fn export_path(&self) -> Option<String> {
+        let field = self.harness.query_by_role_and_label(Role::TextInput, "Export to")?;
+        field.value()
+    }
+
+    /// Mends the wrong patch, so that there is one source.
+    pub fn mend(&mut self) -> Pos2 {
+        let (place, _) = self.hover_wrong_patch();
+        self.click(place);
+        self.wait("a source", |app| app.document().unwrap().sources().len() == 1);
+        self.harness.run_steps(2);
+        place
+    }
+
     pub fn hover(&mut self, place: Pos2) {
         self.harness.hover_at(place);
         self.harness.run_steps(2);
@@ -149,12 +170,15 @@ impl Editor {
     /// Exports through the window: opens it, types the path, presses the button.
     pub fn export_to(&mut self, target: &Path) {
         self.key(Modifiers::COMMAND, Key::E);
+        let suggested = self.export_path().unwrap();
+        assert!(suggested.ends_with("sphere_oriented.ply"), "{suggested}");
+        self.type_export_path(target);
+        self.click_button("Export");
+    }
+
+    /// Types another path into the open export window.
+    pub fn type_export_path(&mut self, target: &Path) {
         let field = self.harness.get_by_role_and_label(Role::TextInput, "Export to");
-        assert!(
-            field.value().unwrap().ends_with("sphere_oriented.ply"),
-            "{:?}",
-            field.value()
-        );
         field.focus();
         self.harness.run_steps(1);
         self.key(Modifiers::COMMAND, Key::A);
@@ -162,7 +186,6 @@ impl Editor {
             .get_by_role_and_label(Role::TextInput, "Export to")
             .type_text(&target.display().to_string());
         self.harness.run_steps(2);
-        self.click_button("Export");
     }
 
     /// Asks the window to close as a desktop does, and returns the commands of the frame that hears of it.

@@ -10,6 +10,7 @@ use crate::command::{Action, Command};
 use crate::dialogs::{DialogAnswer, DialogPurpose};
 use crate::job::JobError;
 use crate::panels::export::ExportWindow;
+use crate::panels::modal::Modal;
 use crate::panels::open_path::OpenPathWindow;
 use crate::scene_sync::Scene;
 use crate::session::Session;
@@ -110,7 +111,7 @@ impl App {
                 }
             }
             Action::BrowseExport => {
-                if let Some(window) = &self.windows.export {
+                if let Some(Modal::Export(window)) = &self.windows.modal {
                     self.dialogs.pick_target(&self.ctx, std::path::Path::new(window.path()));
                 }
             }
@@ -132,12 +133,13 @@ impl App {
             Command::Open => self
                 .dialogs
                 .pick_scan(&self.ctx, self.settings.settings.open_folder.as_deref()),
-            Command::OpenPath => self.windows.open_path = Some(OpenPathWindow::new(None)),
+            Command::OpenPath => self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(None))),
             Command::OpenSample => self.leave(Leaving::Open(ScanOrigin::Sample)),
             Command::Export => {
                 if let Some(session) = &self.session {
                     let suggested = session.suggested_export(self.settings.settings.export_folder.as_deref());
-                    self.windows.export = Some(ExportWindow::new(&suggested, session.scan.path().cloned()));
+                    let window = ExportWindow::new(&suggested, session.scan.path().cloned());
+                    self.windows.modal = Some(Modal::Export(window));
                 }
             }
             Command::Quit => self.ctx.send_viewport_cmd(egui::ViewportCommand::Close),
@@ -207,11 +209,10 @@ impl App {
     /// Escape: the first of these that applies.
     fn cancel(&mut self) {
         let windows = &mut self.windows;
-        if windows.unsaved.take().is_some() || windows.open_path.take().is_some() {
-            return;
-        }
-        if windows.export.take().is_some() {
-            self.after_export = None;
+        if let Some(modal) = windows.modal.take() {
+            if matches!(modal, Modal::Export(_)) {
+                self.after_export = None;
+            }
         } else if windows.shortcuts || windows.about || windows.log {
             (windows.shortcuts, windows.about, windows.log) = (false, false, false);
         } else if let Some(work) = &self.work {
@@ -277,7 +278,7 @@ impl App {
     /// Leaves the document behind, after asking if it has mends that no exported file has.
     fn leave(&mut self, leaving: Leaving) {
         if self.is_unsaved() {
-            self.windows.unsaved = Some(leaving);
+            self.windows.modal = Some(Modal::Unsaved(leaving));
         } else {
             self.leave_now(leaving);
         }
@@ -310,12 +311,15 @@ impl App {
             let note = "This system shows no file dialog (it needs a desktop portal or zenity). Type the path instead.";
             match (purpose, answer) {
                 (_, DialogAnswer::Cancelled) => {}
+                (DialogPurpose::Open, _) if self.windows.modal.is_some() => {
+                    self.messages.info("No scan was opened: answer the open window first.");
+                }
                 (DialogPurpose::Open, DialogAnswer::Picked(path)) => self.act(Action::OpenScan(path)),
                 (DialogPurpose::Open, DialogAnswer::Unavailable) => {
-                    self.windows.open_path = Some(OpenPathWindow::new(Some(note.to_owned())));
+                    self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(Some(note.to_owned()))));
                 }
                 (DialogPurpose::Export, DialogAnswer::Picked(path)) => {
-                    if let Some(window) = &mut self.windows.export {
+                    if let Some(Modal::Export(window)) = &mut self.windows.modal {
                         window.set_path(&path);
                     }
                 }
@@ -358,6 +362,9 @@ impl App {
                         self.leave(leaving);
                     }
                 }
+                Some(Err(JobError::Failed(reason))) if self.windows.modal.is_none() && self.session.is_some() => {
+                    self.export_again(&path, &reason);
+                }
                 Some(Err(error)) => {
                     self.after_export = None;
                     self.say_why("Nothing was exported", error);
@@ -366,12 +373,20 @@ impl App {
         }
     }
 
+    /// Asks for the target once more after an export failed, with the same path and the reason.
+    fn export_again(&mut self, path: &std::path::Path, reason: &str) {
+        let problem = format!("Nothing was exported: {}", sentence(reason));
+        self.messages.log_error(problem.clone());
+        let input = self.session.as_ref().and_then(|session| session.scan.path().cloned());
+        let window = ExportWindow::after_failure(path, input, problem);
+        self.windows.modal = Some(Modal::Export(window));
+    }
+
     fn say_why(&mut self, what: &str, error: JobError) {
         match error {
             JobError::Cancelled => self.messages.info(format!("{what}: cancelled.")),
             JobError::Failed(reason) => {
-                let stop = if reason.ends_with('.') { "" } else { "." };
-                self.messages.error(format!("{what}: {reason}{stop}"));
+                self.messages.error(format!("{what}: {}", sentence(&reason)));
             }
         }
     }
@@ -421,4 +436,10 @@ impl App {
         let time = Duration::from_secs_f64(secs.max(0.0)).as_secs_f32();
         self.messages.info(format!("Oriented {n_points} in {time:.1} s."));
     }
+}
+
+/// `text` with a full stop.
+fn sentence(text: &str) -> String {
+    let stop = if text.ends_with('.') { "" } else { "." };
+    format!("{text}{stop}")
 }

@@ -10,9 +10,10 @@ use normend_render::{DisplayMode, DrawSettings, SplatRenderer};
 use crate::command::{Action, Command, take_shortcuts};
 use crate::dialogs::Dialogs;
 use crate::messages::Messages;
-use crate::panels::export::{self, ExportWindow};
-use crate::panels::open_path::{self, OpenPathWindow};
-use crate::panels::{about, empty, menu_bar, messages, progress, shortcuts, side, status_bar, unsaved};
+use crate::panels::modal::Modal;
+use crate::panels::{
+    about, empty, export, menu_bar, messages, open_path, progress, shortcuts, side, status_bar, unsaved,
+};
 use crate::scene_sync::{Scene, Target};
 use crate::session::Session;
 use crate::settings::SettingsStore;
@@ -25,9 +26,8 @@ use crate::work::{ScanOrigin, Work};
 /// The windows over the editor; `None` or `false` is closed.
 #[derive(Default)]
 pub(crate) struct Windows {
-    pub(crate) export: Option<ExportWindow>,
-    pub(crate) open_path: Option<OpenPathWindow>,
-    pub(crate) unsaved: Option<Leaving>,
+    /// While it is open, nothing else acts.
+    pub(crate) modal: Option<Modal>,
     pub(crate) shortcuts: bool,
     pub(crate) log: bool,
     pub(crate) about: bool,
@@ -214,6 +214,12 @@ impl App {
             self.messages.info("Only the first of the dropped files is opened.");
         }
         if let Some(path) = dropped.into_iter().next() {
+            if self.windows.modal.is_some() {
+                let name = ScanOrigin::File(path).name();
+                self.messages
+                    .info(format!("{name} was not opened: answer the open window first."));
+                return;
+            }
             self.act(Action::OpenScan(path));
         }
     }
@@ -221,6 +227,13 @@ impl App {
     fn take_keys(&mut self) {
         // An open menu or list has the keyboard: Escape closes it, arrows move in it.
         if egui::Popup::is_any_open(&self.ctx) {
+            return;
+        }
+        if self.windows.modal.is_some() {
+            let escape = |input: &mut egui::InputState| input.consume_key(egui::Modifiers::NONE, egui::Key::Escape);
+            if self.ctx.input_mut(escape) {
+                self.act(Command::Cancel.into());
+            }
             return;
         }
         let typing = self.ctx.text_edit_focused();
@@ -410,45 +423,45 @@ impl App {
         }
     }
 
-    fn show_windows(&mut self, ui: &Ui) {
-        if let Some(mut window) = self.windows.open_path.take() {
-            match window.ui(ui) {
-                open_path::Decision::Wait => self.windows.open_path = Some(window),
+    fn show_modal(&mut self, ui: &Ui) {
+        // What is decided may open the next window, so this one is closed first and put back while it waits.
+        match self.windows.modal.take() {
+            None => {}
+            Some(Modal::OpenPath(mut window)) => match window.ui(ui) {
+                open_path::Decision::Wait => self.windows.modal = Some(Modal::OpenPath(window)),
                 open_path::Decision::Close => {}
                 open_path::Decision::Open(path) => self.act(Action::OpenScan(path)),
-            }
-        }
-        if let Some(mut window) = self.windows.export.take() {
-            match window.ui(ui) {
-                export::Decision::Wait => self.windows.export = Some(window),
+            },
+            Some(Modal::Export(mut window)) => match window.ui(ui) {
+                export::Decision::Wait => self.windows.modal = Some(Modal::Export(window)),
                 export::Decision::Close => self.after_export = None,
                 export::Decision::Browse => {
-                    self.windows.export = Some(window);
+                    self.windows.modal = Some(Modal::Export(window));
                     self.act(Action::BrowseExport);
                 }
                 export::Decision::Export { path, overwrite_input } => {
                     self.act(Action::ExportTo { path, overwrite_input });
                 }
-            }
-        }
-        if let Some(leaving) = self.windows.unsaved.clone() {
-            let name = self.session.as_ref().map_or("this scan", |session| &session.name);
-            match unsaved::ui(ui, name) {
-                unsaved::Decision::Wait => {}
-                unsaved::Decision::Export => {
-                    self.act(Command::Export.into());
-                    if self.windows.export.is_some() {
-                        self.windows.unsaved = None;
-                        self.after_export = Some(leaving);
+            },
+            Some(Modal::Unsaved(leaving)) => {
+                let name = self.session.as_ref().map_or("this scan", |session| &session.name);
+                match unsaved::ui(ui, name) {
+                    unsaved::Decision::Wait => self.windows.modal = Some(Modal::Unsaved(leaving)),
+                    unsaved::Decision::Export => {
+                        self.act(Command::Export.into());
+                        match &self.windows.modal {
+                            Some(Modal::Export(_)) => self.after_export = Some(leaving),
+                            _ => self.windows.modal = Some(Modal::Unsaved(leaving)),
+                        }
                     }
+                    unsaved::Decision::Discard => self.leave_now(leaving),
+                    unsaved::Decision::Cancel => {}
                 }
-                unsaved::Decision::Discard => {
-                    self.windows.unsaved = None;
-                    self.leave_now(leaving);
-                }
-                unsaved::Decision::Cancel => self.windows.unsaved = None,
             }
         }
+    }
+
+    fn show_windows(&mut self, ui: &Ui) {
         if self.windows.shortcuts {
             shortcuts::ui(ui, &mut self.windows.shortcuts);
         }
@@ -458,6 +471,7 @@ impl App {
         if self.windows.about {
             about::ui(ui, &mut self.windows.about, &self.adapter);
         }
+        self.show_modal(ui);
     }
 
     fn answer_close_request(&mut self) {
@@ -470,7 +484,9 @@ impl App {
             self.messages.info("The editor closes when the export is written.");
         } else if self.is_unsaved() {
             self.ctx.send_viewport_cmd(egui::ViewportCommand::CancelClose);
-            self.windows.unsaved = Some(Leaving::Quit);
+            // In place of another question: the window's own button comes through while one is open.
+            self.after_export = None;
+            self.windows.modal = Some(Modal::Unsaved(Leaving::Quit));
         }
     }
 

@@ -37,24 +37,31 @@ impl Messages {
     /// Says that something was done.
     pub fn info(&mut self, text: impl Into<String>) {
         let text = text.into();
-        tracing::info!("{text}");
-        self.push(Level::Info, text, self.now + INFO_SECS);
+        tracing::debug!("{text}");
+        self.push(Level::Info, text, Some(self.now + INFO_SECS));
     }
 
     /// Says what failed and what to do.
     pub fn error(&mut self, text: impl Into<String>) {
         let text = text.into();
-        tracing::error!("{text}");
-        self.push(Level::Error, text, self.now + ERROR_SECS);
+        tracing::debug!("{text}");
+        self.push(Level::Error, text, Some(self.now + ERROR_SECS));
     }
 
-    fn push(&mut self, level: Level, text: String, shown_until: f64) {
+    /// Puts into the log what failed and is already shown elsewhere.
+    pub fn log_error(&mut self, text: impl Into<String>) {
+        let text = text.into();
+        tracing::debug!("{text}");
+        self.push(Level::Error, text, None);
+    }
+
+    fn push(&mut self, level: Level, text: String, shown_until: Option<f64>) {
         if let Some(last) = self.entries.last_mut()
             && last.level == level
             && last.text == text
         {
             last.n_times += 1;
-            last.shown_until = Some(shown_until);
+            last.shown_until = shown_until;
             return;
         }
         if self.entries.len() == MAX_ENTRIES {
@@ -64,7 +71,7 @@ impl Messages {
             level,
             text,
             n_times: 1,
-            shown_until: Some(shown_until),
+            shown_until,
         });
     }
 

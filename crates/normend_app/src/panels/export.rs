@@ -2,10 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use egui::{Align2, Key, RichText, TextEdit, Ui, Vec2};
+use egui::{Label, RichText, TextEdit, Ui};
 
+use super::modal;
 use super::open_path::typed_path;
 use crate::theme::{self, SPACE_S};
+
+const WIDTH: f32 = 520.0;
+/// Room for the reason why nothing was exported, two lines of it, so that the window keeps its size.
+const PROBLEM_HEIGHT: f32 = 38.0;
 
 /// The window with the target's path.
 #[derive(Clone, Debug)]
@@ -13,8 +18,9 @@ pub struct ExportWindow {
     path: String,
     input: Option<PathBuf>,
     replace: bool,
-    focused_once: bool,
+    wants_focus: bool,
     checked: Option<(String, Existing)>,
+    problem: Option<String>,
 }
 
 /// What is at the target.
@@ -51,8 +57,17 @@ impl ExportWindow {
             path: path.display().to_string(),
             input,
             replace: false,
-            focused_once: false,
+            wants_focus: true,
             checked: None,
+            problem: None,
+        }
+    }
+
+    /// The window again after an export to `path` failed, with the reason.
+    pub fn after_failure(path: &Path, input: Option<PathBuf>, reason: String) -> Self {
+        Self {
+            problem: Some(reason),
+            ..Self::new(path, input)
         }
     }
 
@@ -65,6 +80,7 @@ impl ExportWindow {
     pub fn set_path(&mut self, path: &Path) {
         self.path = path.display().to_string();
         self.checked = None;
+        self.problem = None;
         self.replace = self.existing() == Existing::File;
     }
 
@@ -85,74 +101,90 @@ impl ExportWindow {
         existing
     }
 
+    /// Why nothing can be exported to the path in the field as things are; `None` when it can.
+    fn refusal(&mut self) -> Option<&'static str> {
+        if typed_path(&self.path).is_none() {
+            return Some("Type the path of the file to write.");
+        }
+        match self.existing() {
+            Existing::Nothing => None,
+            Existing::Folder => Some("This is a folder: add a file name."),
+            Existing::File | Existing::Input if self.replace => None,
+            Existing::File => Some("This file exists: tick “Replace the existing file”, or type another name."),
+            Existing::Input => Some("This is the opened scan: tick “Replace the scan”, or type another name."),
+        }
+    }
+
     /// Shows the window.
     pub fn ui(&mut self, ui: &Ui) -> Decision {
+        modal::show(ui, "Export", WIDTH, |ui| self.content(ui))
+    }
+
+    fn content(&mut self, ui: &mut Ui) -> Decision {
         let mut decision = Decision::Wait;
-        egui::Window::new("Export")
-            .collapsible(false)
-            .resizable(false)
-            .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
-            .show(ui.ctx(), |ui| {
-                ui.set_width(520.0);
-                let about = "The file as it was read, with oriented unit normals nx ny nz.";
-                ui.add(egui::Label::new(RichText::new(about).weak()).wrap());
-                let label = ui.label("Export to");
-                let mut enter = false;
-                ui.horizontal(|ui| {
-                    let field = ui.add(TextEdit::singleline(&mut self.path).desired_width(416.0));
-                    let field = field.labelled_by(label.id);
-                    if field.changed() {
-                        self.replace = false;
-                    }
-                    if !self.focused_once {
-                        field.request_focus();
-                        self.focused_once = true;
-                    }
-                    enter = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
-                    if ui
-                        .button("Browse…")
-                        .on_hover_text("Pick the file with the system's dialog")
-                        .clicked()
-                    {
-                        decision = Decision::Browse;
-                    }
-                });
-                let existing = self.existing();
-                match existing {
-                    Existing::Nothing => {}
-                    Existing::File => {
-                        ui.checkbox(&mut self.replace, "Replace the existing file");
-                    }
-                    Existing::Input => {
-                        ui.checkbox(&mut self.replace, "Replace the scan that was opened");
-                    }
-                    Existing::Folder => {
-                        let text = "This is a folder: add a file name.";
-                        ui.label(RichText::new(text).color(ui.visuals().warn_fg_color));
-                    }
-                }
-                let allowed = match existing {
-                    Existing::Nothing => true,
-                    Existing::File | Existing::Input => self.replace,
-                    Existing::Folder => false,
-                };
-                let path = typed_path(&self.path).filter(|_| allowed);
-                ui.add_space(SPACE_S);
-                ui.horizontal(|ui| {
-                    let export = ui.add_enabled(path.is_some(), theme::primary_button(ui, "Export"));
-                    if (export.clicked() || enter)
-                        && let Some(path) = path
-                    {
+        let about = "The file as it was read, with oriented unit normals nx ny nz.";
+        ui.add(Label::new(RichText::new(about).weak()).wrap());
+        let label = ui.label("Export to");
+        ui.horizontal(|ui| {
+            let field = ui.add(TextEdit::singleline(&mut self.path).desired_width(416.0));
+            let field = field.labelled_by(label.id);
+            if field.changed() {
+                self.replace = false;
+                self.problem = None;
+            }
+            if std::mem::take(&mut self.wants_focus) {
+                field.request_focus();
+            }
+            let browse = ui.button("Browse…");
+            if browse.on_hover_text("Pick the file with the system's dialog").clicked() {
+                decision = Decision::Browse;
+            }
+        });
+        let existing = self.existing();
+        ui.horizontal(|ui| {
+            ui.set_min_height(ui.spacing().interact_size.y);
+            let replace = match existing {
+                Existing::Nothing | Existing::Folder => return,
+                Existing::File => "Replace the existing file",
+                Existing::Input => "Replace the scan that was opened",
+            };
+            if ui.checkbox(&mut self.replace, replace).changed() {
+                self.problem = None;
+            }
+        });
+        ui.vertical(|ui| {
+            ui.set_min_height(PROBLEM_HEIGHT);
+            if existing == Existing::Folder && self.problem.is_none() {
+                self.problem = self.refusal().map(str::to_owned);
+            }
+            if let Some(problem) = &self.problem {
+                ui.add(Label::new(RichText::new(problem).color(ui.visuals().error_fg_color)).wrap());
+            }
+        });
+        ui.add_space(SPACE_S);
+        ui.horizontal(|ui| {
+            let enter = modal::enter_pressed(ui);
+            let refusal = self.refusal();
+            let export = ui.add_enabled(refusal.is_none(), theme::primary_button(ui, "Export"));
+            let export = export.on_disabled_hover_text(refusal.unwrap_or_default());
+            if export.clicked() || enter {
+                match (refusal, typed_path(&self.path)) {
+                    (None, Some(path)) => {
                         decision = Decision::Export {
                             path,
                             overwrite_input: existing == Existing::Input,
                         };
                     }
-                    if ui.button("Cancel").clicked() {
-                        decision = Decision::Close;
+                    (refusal, _) => {
+                        self.problem = refusal.map(str::to_owned);
+                        self.wants_focus = true;
                     }
-                });
-            });
+                }
+            }
+            if ui.button("Cancel").clicked() {
+                decision = Decision::Close;
+            }
+        });
         decision
     }
 }

@@ -24,7 +24,7 @@ pub fn toasts(ui: &Ui, view: Rect, messages: &mut Messages) {
         return;
     }
     Area::new(Id::unique("messages"))
-        .order(Order::Foreground)
+        .order(Order::Middle)
         .pivot(Align2::RIGHT_TOP)
         .fixed_pos(view.right_top() + Vec2::new(-SPACE_M, SPACE_M))
         .show(ui.ctx(), |ui| {

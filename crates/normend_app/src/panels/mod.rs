@@ -7,6 +7,7 @@ pub mod empty;
 pub mod export;
 pub mod menu_bar;
 pub mod messages;
+pub(crate) mod modal;
 pub mod open_path;
 pub mod progress;
 pub mod shortcuts;

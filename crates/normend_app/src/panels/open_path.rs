@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use egui::{Align2, Key, RichText, TextEdit, Ui, Vec2};
+use egui::{RichText, TextEdit, Ui};
 
+use super::modal;
 use crate::theme::{self, SPACE_S};
 
 /// The window with the path field.
@@ -36,38 +37,37 @@ impl OpenPathWindow {
 
     /// Shows the window.
     pub fn ui(&mut self, ui: &Ui) -> Decision {
+        modal::show(ui, "Open a scan", 460.0, |ui| self.content(ui))
+    }
+
+    fn content(&mut self, ui: &mut Ui) -> Decision {
         let mut decision = Decision::Wait;
-        egui::Window::new("Open a scan")
-            .collapsible(false)
-            .resizable(false)
-            .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
-            .show(ui.ctx(), |ui| {
-                ui.set_width(460.0);
-                if let Some(note) = &self.note {
-                    ui.add(egui::Label::new(RichText::new(note).weak()).wrap());
-                }
-                let label = ui.label("Path of the scan");
-                let field = ui.add(TextEdit::singleline(&mut self.path).desired_width(f32::INFINITY));
-                let field = field.labelled_by(label.id);
-                if !self.focused_once {
-                    field.request_focus();
-                    self.focused_once = true;
-                }
-                let path = typed_path(&self.path);
-                let enter = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
-                ui.add_space(SPACE_S);
-                ui.horizontal(|ui| {
-                    let open = ui.add_enabled(path.is_some(), theme::primary_button(ui, "Open"));
-                    if (open.clicked() || enter)
-                        && let Some(path) = path
-                    {
-                        decision = Decision::Open(path);
-                    }
-                    if ui.button("Cancel").clicked() {
-                        decision = Decision::Close;
-                    }
-                });
-            });
+        if let Some(note) = &self.note {
+            ui.add(egui::Label::new(RichText::new(note).weak()).wrap());
+        }
+        let label = ui.label("Path of the scan");
+        let field = ui.add(TextEdit::singleline(&mut self.path).desired_width(f32::INFINITY));
+        let field = field.labelled_by(label.id);
+        let path = typed_path(&self.path);
+        let enter = modal::enter_pressed(ui);
+        // An Enter without a path opens nothing, and typing goes on.
+        if !self.focused_once || (enter && path.is_none()) {
+            field.request_focus();
+            self.focused_once = true;
+        }
+        ui.add_space(SPACE_S);
+        ui.horizontal(|ui| {
+            let open = ui.add_enabled(path.is_some(), theme::primary_button(ui, "Open"));
+            let open = open.on_disabled_hover_text("Type a path first");
+            if (open.clicked() || enter)
+                && let Some(path) = path
+            {
+                decision = Decision::Open(path);
+            }
+            if ui.button("Cancel").clicked() {
+                decision = Decision::Close;
+            }
+        });
         decision
     }
 }

@@ -9,7 +9,7 @@ use crate::theme::{self, SPACE_L, SPACE_M, SPACE_XS};
 pub fn ui(ui: &Ui, view: Rect, title: &str, status: &JobStatus) -> bool {
     let mut cancel = false;
     Area::new(Id::unique("running job"))
-        .order(Order::Foreground)
+        .order(Order::Middle)
         .pivot(Align2::CENTER_BOTTOM)
         .fixed_pos(view.center_bottom() - Vec2::new(0.0, SPACE_L))
         .show(ui.ctx(), |ui| {

@@ -1,7 +1,8 @@
 //! The question before mends are lost.
 
-use egui::{Align2, Ui, Vec2};
+use egui::{Label, Ui};
 
+use super::modal;
 use crate::theme::{self, SPACE_S};
 
 /// What the user decided.
@@ -19,26 +20,22 @@ pub enum Decision {
 
 /// Asks about the mends of the scan called `name`.
 pub fn ui(ui: &Ui, name: &str) -> Decision {
-    let mut decision = Decision::Wait;
-    egui::Window::new("Unsaved mends")
-        .collapsible(false)
-        .resizable(false)
-        .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
-        .show(ui.ctx(), |ui| {
-            ui.set_width(400.0);
-            ui.add(egui::Label::new(format!("The mends of {name} are in no exported file yet.")).wrap());
-            ui.add_space(SPACE_S);
-            ui.horizontal(|ui| {
-                if ui.add(theme::primary_button(ui, "Export…")).clicked() {
-                    decision = Decision::Export;
-                }
-                if ui.button("Discard").clicked() {
-                    decision = Decision::Discard;
-                }
-                if ui.button("Cancel").clicked() {
-                    decision = Decision::Cancel;
-                }
-            });
+    modal::show(ui, "Unsaved mends", 400.0, |ui| {
+        let mut decision = Decision::Wait;
+        ui.add(Label::new(format!("The mends of {name} are in no exported file yet.")).wrap());
+        ui.add_space(SPACE_S);
+        ui.horizontal(|ui| {
+            let enter = modal::enter_pressed(ui);
+            if ui.add(theme::primary_button(ui, "Export…")).clicked() || enter {
+                decision = Decision::Export;
+            }
+            if ui.button("Discard").clicked() {
+                decision = Decision::Discard;
+            }
+            if ui.button("Cancel").clicked() {
+                decision = Decision::Cancel;
+            }
         });
-    decision
+        decision
+    })
 }

@@ -1,0 +1,39 @@
+//! Windows that have the keyboard and the pointer to themselves until they are closed; one at a time.
+
+use egui::{Id, Key, RichText, Ui};
+
+use super::export::ExportWindow;
+use super::open_path::OpenPathWindow;
+use crate::app::Leaving;
+use crate::theme::{SPACE_L, SPACE_S};
+
+/// The window that has to be answered before the editor goes on.
+#[derive(Clone, Debug)]
+pub(crate) enum Modal {
+    /// Where the oriented scan goes.
+    Export(ExportWindow),
+    /// Which scan to open.
+    OpenPath(OpenPathWindow),
+    /// Whether mends may be lost.
+    Unsaved(Leaving),
+}
+
+/// Shows a window called `title` over a backdrop that takes every click beside it. Tab stays inside.
+pub(crate) fn show<R>(ui: &Ui, title: &str, width: f32, content: impl FnOnce(&mut Ui) -> R) -> R {
+    let room = ui.ctx().content_rect().width() - 4.0 * SPACE_L;
+    egui::Modal::new(Id::unique(("modal", title)))
+        .frame(egui::Frame::window(ui.style()))
+        .show(ui.ctx(), |ui| {
+            ui.set_width(width.min(room));
+            ui.label(RichText::new(title).heading().color(ui.visuals().strong_text_color()));
+            ui.add_space(SPACE_S);
+            content(ui)
+        })
+        .inner
+}
+
+/// Whether Enter means the window's primary button: it does unless another widget has the focus and takes it. Asked
+/// after the window's fields, which give the focus back on Enter.
+pub(crate) fn enter_pressed(ui: &Ui) -> bool {
+    ui.input(|input| input.key_pressed(Key::Enter)) && ui.memory(|memory| memory.focused().is_none())
+}

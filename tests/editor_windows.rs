@@ -1,0 +1,148 @@
+//! The windows over the editor: what they hold back, what they say, and that they fit.
+//!
+//! Without a graphics adapter the tests say that they are skipped; with `NORMEND_REQUIRE_GPU=1` they fail instead.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests fail as tests do, by panicking")]
+
+#[expect(dead_code, reason = "the other tests of the editor use the rest")]
+#[path = "editor/driver.rs"]
+mod driver;
+
+use std::fs;
+
+use egui::accesskit::Role;
+use egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable;
+
+use driver::{sphere_with_wrong_cap, start};
+
+#[test]
+fn nothing_acts_behind_an_open_question() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let place = editor.mend();
+    editor.key(Modifiers::COMMAND, Key::A);
+    editor.harness.run_steps(20);
+    let (bits, picture) = (editor.bits(), editor.picture());
+
+    editor.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::O);
+    assert!(editor.is_focused(Role::TextInput, "Path of the scan"));
+    for (modifiers, key) in [
+        (Modifiers::NONE, Key::Enter),
+        (Modifiers::SHIFT, Key::Enter),
+        (Modifiers::COMMAND, Key::Enter),
+        (Modifiers::COMMAND, Key::E),
+        (Modifiers::COMMAND, Key::Z),
+        (Modifiers::NONE, Key::X),
+        (Modifiers::NONE, Key::Delete),
+        (Modifiers::NONE, Key::Num7),
+        (Modifiers::NONE, Key::F1),
+    ] {
+        editor.key(modifiers, key);
+        assert!(!editor.app().is_busy(), "{key:?}");
+        assert_eq!((editor.bits(), editor.n_sources()), (bits.clone(), 1), "{key:?}");
+    }
+    assert!(editor.export_path().is_none() && !editor.shows("Right, middle"));
+
+    // Nor does the pointer, and with nothing in focus the keys still do not reach the view.
+    editor.click(place + egui::Vec2::new(0.0, -120.0));
+    editor.key(Modifiers::NONE, Key::X);
+    editor.key(Modifiers::NONE, Key::Num7);
+    editor.harness.run_steps(20);
+    assert_eq!((editor.bits(), editor.n_sources()), (bits.clone(), 1));
+
+    editor.key(Modifiers::NONE, Key::Escape);
+    assert!(!editor.shows("Path of the scan"));
+    editor.hover(place);
+    editor.harness.run_steps(20);
+    assert_eq!(editor.picture().rgba, picture.rgba, "the view turned behind the window");
+    editor.key(Modifiers::NONE, Key::X);
+    assert_ne!(editor.bits(), bits, "the keys act again");
+}
+
+#[test]
+fn the_focus_stays_in_the_question() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    editor.mend();
+    editor.close();
+    editor.harness.run_steps(2);
+    let mut seen = [false; 3];
+    for _ in 0..7 {
+        editor.key(Modifiers::NONE, Key::Tab);
+        let focused = ["Export…", "Discard", "Cancel"].map(|label| editor.is_focused(Role::Button, label));
+        assert!(focused.contains(&true), "the focus left the question");
+        for (seen, focused) in seen.iter_mut().zip(focused) {
+            *seen |= focused;
+        }
+    }
+    assert_eq!(seen, [true; 3]);
+    editor.key(Modifiers::NONE, Key::Escape);
+    assert!(!editor.shows("Unsaved mends"));
+
+    // Enter is the primary button: export first.
+    editor.close();
+    editor.harness.run_steps(2);
+    editor.key(Modifiers::NONE, Key::Enter);
+    assert!(editor.export_path().is_some() && !editor.shows("Unsaved mends"));
+}
+
+#[test]
+fn enter_says_why_an_existing_file_is_not_replaced() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let target = editor.folder.path().join("taken.ply");
+    fs::write(&target, "something else").unwrap();
+    editor.key(Modifiers::COMMAND, Key::E);
+    let height = |editor: &driver::Editor| {
+        let cancel = editor
+            .harness
+            .get_all_by_role_and_label(Role::Button, "Cancel")
+            .last()
+            .unwrap();
+        cancel.rect().top()
+            - editor
+                .harness
+                .get_by_role_and_label(Role::TextInput, "Export to")
+                .rect()
+                .top()
+    };
+    let before = height(&editor);
+    editor.type_export_path(&target);
+    editor.key(Modifiers::NONE, Key::Enter);
+    assert!(editor.shows("This file exists"));
+    assert_eq!(height(&editor), before, "the window jumps");
+    assert!(editor.is_focused(Role::TextInput, "Export to"));
+    assert_eq!(fs::read_to_string(&target).unwrap(), "something else");
+    editor.harness.get_by_label("Replace the existing file").click();
+    editor.harness.run_steps(2);
+    assert!(!editor.shows("This file exists"));
+    editor.click_button("Export");
+    editor.wait("an exported file", |app| !app.is_busy());
+    assert!(editor.said("Exported"), "{:?}", editor.app().messages().entries());
+}
+
+#[test]
+fn a_failed_export_keeps_the_path_and_says_why() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let target = editor.folder.path().join("no such folder").join("mended.ply");
+    editor.export_to(&target);
+    editor.wait("the end of the export", |app| !app.is_busy());
+    editor.harness.run_steps(2);
+    assert_eq!(editor.export_path(), Some(target.display().to_string()));
+    assert!(editor.shows("Nothing was exported"));
+    // The folder is made meanwhile, and Enter tries again.
+    fs::create_dir(target.parent().unwrap()).unwrap();
+    editor.key(Modifiers::NONE, Key::Enter);
+    editor.wait("an exported file", |app| !app.is_busy());
+    assert!(target.exists() && editor.export_path().is_none());
+}
