@@ -77,6 +77,33 @@ fn headers_that_do_not_end() {
 }
 
 #[test]
+fn headers_with_more_declarations_than_any_scan() {
+    let check_count = |n_elements: usize, n_properties: usize, expect: Option<usize>| {
+        let mut file = format!("ply\nformat ascii 1.0\nelement vertex 1\n{XYZ}").into_bytes();
+        for index in 3..n_properties {
+            file.extend_from_slice(format!("property float p{index}\n").as_bytes());
+        }
+        for index in 1..n_elements {
+            file.extend_from_slice(format!("element e{index} 0\n").as_bytes());
+        }
+        file.extend_from_slice(b"end_header\n");
+        file.extend_from_slice(&b"1 ".repeat(n_properties));
+        match expect {
+            Some(line) => check(
+                &file,
+                &format!(
+                    ", line {line}: more than 1024 elements or 4096 properties are declared: export the file with fewer"
+                ),
+            ),
+            None => assert_eq!(read_bytes(file, "scan.ply", &Silent).unwrap().cloud.n_points(), 1),
+        }
+    };
+    check_count(1024, 4096, None);
+    check_count(1, 4097, Some(3 + 4097));
+    check_count(1025, 3, Some(3 + 3 + 1024));
+}
+
+#[test]
 fn lines_that_do_not_belong_into_a_header() {
     check(
         with_line("property int64 time").as_bytes(),

@@ -15,6 +15,11 @@ use crate::value::{Scalar, ValueType};
 /// What begins the comment that Normend leaves in the files it writes.
 pub(crate) const OWN_COMMENT: &[u8] = b"comment Normend ";
 
+/// Most elements and properties that a header may declare. Each takes many times the memory of its line, and no scan has
+/// nearly as many.
+const MOST_ELEMENTS: usize = 1024;
+const MOST_PROPERTIES: usize = 4096;
+
 #[derive(Clone, Debug)]
 pub(crate) struct Header {
     pub encoding: Encoding,
@@ -108,7 +113,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Header, Broken> {
     }
     let mut declarations = Vec::new();
     let mut own_comment = None;
-    let (mut has_format, mut has_element) = (false, false);
+    let mut has_format = false;
+    let (mut n_elements, mut n_properties) = (0, 0);
     loop {
         let Some(line) = lines.next() else {
             return Err(Broken::new(
@@ -133,11 +139,18 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Header, Broken> {
                 if keyword == b"format" && has_format {
                     return declaration.fail("a second format line: remove the wrong one".to_owned());
                 }
-                if keyword == b"property" && !has_element {
+                if keyword == b"property" && n_elements == 0 {
                     return declaration.fail("a property before the first element: correct the order".to_owned());
                 }
                 has_format |= keyword == b"format";
-                has_element |= keyword == b"element";
+                n_elements += usize::from(keyword == b"element");
+                n_properties += usize::from(keyword == b"property");
+                if n_elements > MOST_ELEMENTS || n_properties > MOST_PROPERTIES {
+                    return declaration.fail(format!(
+                        "more than {MOST_ELEMENTS} elements or {MOST_PROPERTIES} properties are declared: export the file \
+                         with fewer"
+                    ));
+                }
                 declarations.push(declaration);
             }
             _ => return Err(why_not(bytes, &Declaration { line, words })),
