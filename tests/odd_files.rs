@@ -319,7 +319,11 @@ proptest! {
     ) {
         // Without names the coordinates come first.
         let columns = if names_after.is_some() { columns } else { vec!["x", "Y", "z", "red"] };
-        let last = columns.iter().rposition(|name| ["x", "Y", "z"].contains(name)).unwrap();
+        let is_coordinate = |name: &&str| ["x", "Y", "z"].contains(name);
+        // In a comment only neighbors are known as the names of coordinates.
+        let are_neighbors = columns.windows(3).any(|three| three.iter().all(is_coordinate));
+        let names_after = names_after.map(|mark| if are_neighbors { mark } else { "" });
+        let last = columns.iter().rposition(is_coordinate).unwrap();
         let names: Vec<String> = columns.iter().map(|name| (*name).to_owned()).collect();
         let new_names = if columns[last] == "Y" { ["Nx", "Ny", "Nz"] } else { ["nx", "ny", "nz"] };
         let mut lines = Vec::new();
@@ -444,6 +448,43 @@ fn from_one_format_to_another() {
     // A decimal that f32 gives back is a float, though f32 rounds it.
     let scan = read_bytes(b"0.1 0.2 0.3\n".to_vec(), "a.xyz", &Silent).unwrap();
     assert!(String::from_utf8_lossy(&written(&scan, &[Vec3::X], "b.ply")).contains("property float x\n"));
+}
+
+#[test]
+fn prose_in_comments_names_no_columns() {
+    let normals = [Vec3::X];
+    let xyz = [DVec3::new(1.0, 2.0, 3.0)];
+    // Each comment has as many words as there are columns, among them x, y and z.
+    let check_prose = |comment: &str, row: &str| {
+        let input = format!("{comment}\n{row}\n");
+        let scan = scan("a.xyz", &input);
+        assert_eq!(points(&scan), xyz, "{comment}");
+        let out = String::from_utf8(written(&scan, &normals, "out.xyz")).unwrap();
+        let expect = input.replace("1 2 3", "1 2 3 1 0 0");
+        assert_eq!(out, expect, "the comment stays");
+    };
+    check_prose("# each line has x y z", "1 2 3 9 8 7");
+    check_prose("# the x and y and z", "1 2 3 9 8 7");
+    check_prose("# x y z in scanner coordinates", "1 2 3 9 8 7");
+    check_prose("// z up, y north, x east", "1 2 3 9 8 7");
+    check_prose("# meters: x y z", "1 2 3 9");
+    check_prose("# z axis, x first, y", "1 2 3 9 8");
+    // Names they are.
+    let check_names = |comment: &str, row: &str| {
+        let scan = scan("a.xyz", format!("{comment}\n{row}\n"));
+        assert_eq!(points(&scan), xyz, "{comment}");
+        let out = String::from_utf8(written(&scan, &normals, "out.xyz")).unwrap();
+        let again = read_bytes(out.into_bytes(), "out.xyz", &Silent).unwrap();
+        assert_eq!(points(&again), xyz, "{comment}");
+        assert_eq!(again.given_normals.unwrap()[..], normals, "{comment}");
+    };
+    check_names("# id x y z", "9 1 2 3");
+    check_names("# label z y x", "9 3 2 1");
+    check_names(
+        "//X,Y,Z,Scalar_field,\"GPS time (s)\"".replace(' ', "_").as_str(),
+        "1,2,3,7,8",
+    );
+    check_names("# index x y z nx ny nz intensity", "9 1 2 3 0 0 1 55");
 }
 
 #[test]

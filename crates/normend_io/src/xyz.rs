@@ -114,15 +114,17 @@ impl XyzLayout {
             };
             let content = line.of(bytes);
             if is_skipped(content) {
-                // CloudCompare writes the names into a comment.
                 let hidden = content
                     .iter()
                     .take_while(|byte| is_space(**byte) || matches!(byte, b'#' | b'/'))
                     .count();
-                names.push(Span {
-                    start: line.start + hidden,
-                    end: line.end,
-                });
+                // CloudCompare writes the names into a comment.
+                if are_names(&content[hidden..]) {
+                    names.push(Span {
+                        start: line.start + hidden,
+                        end: line.end,
+                    });
+                }
                 continue;
             }
             let mut values = Values::new(content);
@@ -259,18 +261,36 @@ impl Layout for XyzLayout {
     }
 }
 
+/// Whether the words of a comment are the names of columns, rather than prose in which x, y and z occur: these stand side
+/// by side, only usual names stand before them, and every word could be a name.
+fn are_names(comment: &[u8]) -> bool {
+    const BEFORE: &str =
+        "id idx index no nr n pointid point_id t time red green blue r g b intensity class label nx ny nz";
+    const PROSE: &str = "a an and are as at by each for from in is of on per the to with";
+    let words: Vec<String> = Values::new(comment).map(|word| plain_name(word.of(comment))).collect();
+    let is_one_of = |word: &String, list: &str| list.split(' ').any(|listed| listed == word);
+    let is_name = |word: &String| {
+        let may_hold = |byte: u8| byte.is_ascii_alphanumeric() || b"_-.()[]/%#".contains(&byte) || !byte.is_ascii();
+        word.bytes().all(may_hold) && !word.ends_with('.') && !is_one_of(word, PROSE)
+    };
+    let are_coordinates = |three: &[String]| ["x", "y", "z"].iter().all(|axis| three.iter().any(|word| word == axis));
+    words
+        .windows(3)
+        .position(are_coordinates)
+        .is_some_and(|first| words[..first].iter().all(|word| is_one_of(word, BEFORE)) && words.iter().all(is_name))
+}
+
+/// A name without quotes, in lower case.
+fn plain_name(name: &[u8]) -> String {
+    name.iter()
+        .filter(|byte| !matches!(byte, b'"' | b'\''))
+        .map(|byte| byte.to_ascii_lowercase() as char)
+        .collect()
+}
+
 /// The columns of x y z nx ny nz by their names, and whether there are normals; `None` without x, y and z.
 fn columns_by_name(line: &[u8]) -> Option<([usize; 6], bool)> {
-    let is_quote = |byte: &u8| matches!(byte, b'"' | b'\'');
-    let names: Vec<String> = Values::new(line)
-        .map(|name| {
-            name.of(line)
-                .iter()
-                .filter(|byte| !is_quote(byte))
-                .map(|byte| byte.to_ascii_lowercase() as char)
-                .collect()
-        })
-        .collect();
+    let names: Vec<String> = Values::new(line).map(|name| plain_name(name.of(line))).collect();
     let find = |wanted: &[&str]| names.iter().position(|name| wanted.contains(&name.as_str()));
     let [x, y, z] = [find(&["x"])?, find(&["y"])?, find(&["z"])?];
     let normal = (|| {
