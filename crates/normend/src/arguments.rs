@@ -54,7 +54,11 @@ impl Arguments {
             let is_second_scan =
                 error.kind() == ErrorKind::ArgumentConflict && error.get(ContextKind::InvalidSubcommand).is_some();
             if is_second_scan {
-                usage_error(None, "the editor opens one scan, and a command comes before all else").exit()
+                usage_error(
+                    None,
+                    "the editor opens one scan at a time; a command (orient, check, …) comes first",
+                )
+                .exit()
             }
             error.exit()
         })
