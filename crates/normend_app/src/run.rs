@@ -124,10 +124,12 @@ fn in_words(error: &str) -> String {
         "adapter",
         "WGPU error",
     ]) {
+        // The libraries may add what each driver said, as a dump of their own values.
+        let line = first_line(error);
+        let reason = line.split_once(": {").map_or(line, |(reason, _)| reason);
         format!(
-            "The editor found no graphics driver that it can use ({}). On Debian and Ubuntu: \
-             apt install libvulkan1 mesa-vulkan-drivers",
-            first_line(error)
+            "The editor found no graphics driver that it can use ({reason}). On Debian and Ubuntu: \
+             apt install libvulkan1 mesa-vulkan-drivers"
         )
     } else {
         format!("The editor had to stop because of an error that it does not know: {error}")
@@ -164,6 +166,10 @@ mod tests {
         check(
             "WGPU error: Failed to create surface for any enabled backend: {}",
             "mesa-vulkan-drivers",
+        );
+        check(
+            "WGPU error: Failed to create surface for any enabled backend: {Vulkan: Hal(())}",
+            "use (WGPU error: Failed to create surface for any enabled backend). On",
         );
         check("something else", "something else");
     }
