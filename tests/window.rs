@@ -294,6 +294,7 @@ fn a_wrong_patch_is_mended_in_the_window() {
     assert!(n_wrong_before > 0, "the scan needs a wrong patch");
 
     let display = Display::start(folder);
+    let log = || fs::read_to_string(folder.join("log")).unwrap();
     let mut editor = Killed(
         Command::new(env!("CARGO_BIN_EXE_normend"))
             .arg("scan.ply")
@@ -303,7 +304,9 @@ fn a_wrong_patch_is_mended_in_the_window() {
             .env_remove("WAYLAND_SOCKET")
             .env("NORMEND_CONFIG_DIR", folder.join("config"))
             .env("XDG_RUNTIME_DIR", folder)
+            .env("RUST_LOG", "normend_app=debug")
             .stdin(Stdio::null())
+            .stderr(fs::File::create(folder.join("log")).unwrap())
             .spawn()
             .unwrap(),
     );
@@ -312,7 +315,7 @@ fn a_wrong_patch_is_mended_in_the_window() {
     display.move_pointer(aside);
     let patch = display.wait_for("an orange patch", |shot| {
         let ended = editor.0.try_wait().unwrap();
-        assert!(ended.is_none(), "the editor ended: {ended:?}");
+        assert!(ended.is_none(), "the editor ended: {ended:?}: {}", log());
         shot.middle_of_orange()
     });
     // Without a window manager nobody gives the keyboard to the window.
@@ -360,5 +363,8 @@ fn a_wrong_patch_is_mended_in_the_window() {
     display.wait_for_rest();
     display.xdotool(&["key", "ctrl+q"]);
     let status = display.wait_for("the end of the editor", |_| editor.0.try_wait().unwrap());
-    assert!(status.success(), "{status}");
+    let log = log();
+    assert!(status.success(), "{status}: {log}");
+    // Colors are for terminals, not for files.
+    assert!(log.contains("DEBUG normend_app") && !log.contains('\x1b'), "{log:?}");
 }

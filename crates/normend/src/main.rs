@@ -83,11 +83,10 @@ fn exit_code_of(error: &anyhow::Error, name: Option<&str>) -> ExitCode {
 }
 
 /// Diagnostics for developers on standard error, chosen by `RUST_LOG`; by default warnings and errors, and of the window
-/// system only errors, because it warns of every display that is not quite usual. What the editor's window says is not
-/// said again. In color only for people: on a terminal, unless `NO_COLOR` is set.
+/// system only errors, because it warns of every display that is not quite usual. In color only on a terminal, and not
+/// when `NO_COLOR` is set.
 fn start_log() {
-    let filter = EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| EnvFilter::new("warn,winit=error,normend_app::messages=off"));
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn,winit=error"));
     let is_colored = io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
     tracing_subscriber::fmt()
         .with_env_filter(filter)
