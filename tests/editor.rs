@@ -19,7 +19,8 @@ use normend_app::messages::Level;
 use normend_core::{Silent, Start, shapes};
 
 use driver::{
-    N_POINTS, is_back, is_front, n_different, sphere_with_wrong_cap, sphere_without_normals, start, start_scaled,
+    N_POINTS, is_back, is_flipped_source, is_front, n_different, sphere_with_wrong_cap, sphere_without_normals, start,
+    start_scaled,
 };
 
 #[test]
@@ -182,9 +183,10 @@ fn sources_are_selected_flipped_and_removed() {
     let mended = editor.bits();
     let point = editor.app().document().unwrap().sources().iter().next().unwrap().point;
 
-    // Its sphere is under the pointer now: a click on it selects it, and X and Delete act on it.
+    // A click on its sphere selects it, and X and Delete act on it.
     editor.harness.run_steps(40);
-    editor.click(place);
+    let sphere = editor.picture().inside(is_flipped_source).unwrap();
+    editor.click(editor.place(sphere));
     editor.wait("a selection", |app| app.availability(Command::RemoveSources).is_ok());
     assert_eq!((editor.bits(), editor.n_sources()), (mended.clone(), 1));
     editor.key(Modifiers::NONE, Key::X);
@@ -272,6 +274,33 @@ fn closing_asks_about_unsaved_mends() {
     let commands = editor.commands_of(3);
     assert!(commands.contains(&egui::ViewportCommand::Close), "{commands:?}");
     assert!(!editor.close().contains(&egui::ViewportCommand::CancelClose));
+}
+
+#[test]
+fn another_propagation_is_unsaved_until_it_is_exported() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    assert!(!editor.app().is_unsaved(), "as it came in");
+    editor.click_button("Estimate");
+    assert!(!editor.app().is_unsaved(), "not applied yet");
+    editor.click_button("Propagate");
+    editor.wait("another propagation", |app| !app.is_busy());
+    assert!(editor.app().is_unsaved());
+    assert!(editor.close().contains(&egui::ViewportCommand::CancelClose));
+    editor.harness.run_steps(2);
+    assert!(editor.shows("The new propagation of sphere.ply is in no exported file yet"));
+    editor.key(Modifiers::NONE, Key::Escape);
+    let target = editor.folder.path().join("again.ply");
+    editor.export_to(&target);
+    editor.wait("an exported file", |app| !app.is_busy());
+    assert!(!editor.app().is_unsaved());
+    editor.click_button("Keep given");
+    editor.click_button("Propagate");
+    editor.wait("a third propagation", |app| !app.is_busy());
+    assert!(editor.app().is_unsaved(), "the file has the second");
+    assert!(editor.said("Kept the given normals of 4,000 points"));
 }
 
 #[test]
@@ -375,7 +404,12 @@ fn a_broken_file_gives_words_and_keeps_what_is_open() {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         let last = editor.app().messages().entries().last().unwrap();
         assert_eq!(last.level, Level::Error);
-        assert!(last.text.contains(&format!("{name} was not opened")), "{}", last.text);
+        assert!(
+            last.text.ends_with(&format!(". {name} was not opened.")),
+            "{}",
+            last.text
+        );
+        assert_eq!(last.text.matches(&name).count(), 1, "{}", last.text);
     }
     assert_eq!(editor.app().document().unwrap().cloud().n_points(), 300);
 }

@@ -12,7 +12,8 @@ use std::fs;
 
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
+use normend_app::messages::Level;
 
 use driver::{sphere_with_wrong_cap, start};
 
@@ -145,4 +146,69 @@ fn a_failed_export_keeps_the_path_and_says_why() {
     editor.key(Modifiers::NONE, Key::Enter);
     editor.wait("an exported file", |app| !app.is_busy());
     assert!(target.exists() && editor.export_path().is_none());
+}
+
+#[test]
+fn the_sheet_fits_into_the_smallest_window() {
+    let Some(mut editor) = start(|_| None) else { return };
+    for size in [egui::Vec2::new(900.0, 600.0), egui::Vec2::new(1400.0, 1000.0)] {
+        editor.harness.set_size(size);
+        editor.key(Modifiers::NONE, Key::F1);
+        editor.harness.run_steps(4);
+        // What is done stands left, the keys right: both are inside, and no column is squeezed over another.
+        for (what, how) in normend_app::command::MOUSE {
+            let [what, how] = [what, how].map(|label| {
+                let found = editor.harness.query_all_by_label(label);
+                found
+                    .map(|node| node.rect())
+                    .max_by(|a, b| a.left().total_cmp(&b.left()))
+                    .unwrap()
+            });
+            assert!(
+                what.left() > 16.0 && how.right() < size.x - 16.0,
+                "{what:?} {how:?} {size:?}"
+            );
+        }
+        let titles: Vec<_> = editor
+            .harness
+            .get_all_by_label("Keys and mouse")
+            .map(|node| node.rect())
+            .collect();
+        assert!(titles.iter().all(|rect| rect.top() > 0.0), "{titles:?} {size:?}");
+        editor.key(Modifiers::NONE, Key::Escape);
+    }
+}
+
+#[test]
+fn refusals_are_notes_and_errors_begin_with_the_reason() {
+    let Some(mut editor) = start(|_| None) else { return };
+    editor.key(Modifiers::COMMAND, Key::E);
+    let entries = editor.app().messages().entries();
+    let last = entries.last().unwrap();
+    assert_eq!(
+        (last.level, last.text.as_str()),
+        (Level::Note, "Export: no scan is open.")
+    );
+    editor.key(Modifiers::NONE, Key::F2);
+    assert!(editor.shows("Note") && editor.shows("0:00:0") && !editor.shows("Done"));
+    editor.key(Modifiers::NONE, Key::Escape);
+    assert!(!editor.shows("0:00:0"));
+}
+
+#[test]
+fn what_is_not_fitted_is_not_asked_for() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let is_disabled = |editor: &driver::Editor| {
+        let k = editor.harness.get_by_role_and_label(Role::SpinButton, "k for normals");
+        k.accesskit_node().is_disabled()
+    };
+    let top = |editor: &driver::Editor| editor.harness.get_by_label("Sources").rect().top();
+    assert!(is_disabled(&editor), "every normal of the file is kept");
+    let before = top(&editor);
+    editor.click_button("Estimate");
+    assert!(!is_disabled(&editor));
+    assert_eq!(top(&editor), before, "the hint moves what stands below");
 }

@@ -258,6 +258,11 @@ pub fn is_back([red, _, blue]: [u8; 3]) -> bool {
     i32::from(red) > i32::from(blue) + 40
 }
 
+/// The pink of the sphere of a source that turned its point.
+pub fn is_flipped_source([red, green, blue]: [u8; 3]) -> bool {
+    i32::from(red.min(blue)) > i32::from(green) + 40
+}
+
 /// Blue, in any light.
 pub fn is_front([red, _, blue]: [u8; 3]) -> bool {
     i32::from(blue) > i32::from(red) + 40

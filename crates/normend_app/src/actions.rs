@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use normend_core::{Document, Edit};
+use normend_core::{Document, Edit, Start};
 use normend_render::DisplayMode;
 
 use crate::app::{App, Leaving};
@@ -83,7 +83,10 @@ impl App {
             Action::Run(command) => match self.availability(command) {
                 Ok(()) => self.run(command),
                 // A key that does nothing now says why.
-                Err(reason) => self.messages.info(format!("{}: {reason}.", command.label())),
+                Err(reason) => {
+                    let name = command.label().trim_end_matches('…');
+                    self.messages.note(format!("{name}: {reason}."));
+                }
             },
             Action::OpenScan(path) => self.leave(Leaving::Open(ScanOrigin::File(path))),
             Action::ClearRecent => self.settings.settings.recent.clear(),
@@ -312,7 +315,7 @@ impl App {
             match (purpose, answer) {
                 (_, DialogAnswer::Cancelled) => {}
                 (DialogPurpose::Open, _) if self.windows.modal.is_some() => {
-                    self.messages.info("No scan was opened: answer the open window first.");
+                    self.messages.note("No scan was opened: answer the open window first.");
                 }
                 (DialogPurpose::Open, DialogAnswer::Picked(path)) => self.act(Action::OpenScan(path)),
                 (DialogPurpose::Open, DialogAnswer::Unavailable) => {
@@ -323,7 +326,7 @@ impl App {
                         window.set_path(&path);
                     }
                 }
-                (DialogPurpose::Export, DialogAnswer::Unavailable) => self.messages.info(note),
+                (DialogPurpose::Export, DialogAnswer::Unavailable) => self.messages.note(note),
             }
         }
     }
@@ -334,7 +337,9 @@ impl App {
             Some(Work::Open { job, origin }) => match job.poll() {
                 None => self.work = Some(Work::Open { job, origin }),
                 Some(Ok(scan)) => self.show_scan(scan, &origin),
-                Some(Err(error)) => self.say_why(&format!("{} was not opened", origin.name()), error),
+                Some(Err(error)) => {
+                    self.say_why(&format!("{} was not opened", theme::elided(&origin.name(), 48)), error)
+                }
             },
             Some(Work::Propagate(job)) => match job.poll() {
                 None => self.work = Some(Work::Propagate(job)),
@@ -348,12 +353,24 @@ impl App {
                     }
                 }
             },
-            Some(Work::Export { job, path, revision }) => match job.poll() {
-                None => self.work = Some(Work::Export { job, path, revision }),
+            Some(Work::Export {
+                job,
+                path,
+                revision,
+                parameters,
+            }) => match job.poll() {
+                None => {
+                    self.work = Some(Work::Export {
+                        job,
+                        path,
+                        revision,
+                        parameters,
+                    });
+                }
                 Some(Ok(())) => {
                     self.settings.settings.export_folder = path.parent().map(std::path::Path::to_path_buf);
                     if let Some(session) = &mut self.session {
-                        session.mark_saved(revision);
+                        session.mark_saved(revision, parameters);
                         let n_points = theme::counted(session.scan.cloud.n_points() as u64, "point", "points");
                         self.messages
                             .info(format!("Exported {n_points} to {}.", path.display()));
@@ -375,7 +392,7 @@ impl App {
 
     /// Asks for the target once more after an export failed, with the same path and the reason.
     fn export_again(&mut self, path: &std::path::Path, reason: &str) {
-        let problem = format!("Nothing was exported: {}", sentence(reason));
+        let problem = format!("{} Nothing was exported.", sentence(reason));
         self.messages.log_error(problem.clone());
         let input = self.session.as_ref().and_then(|session| session.scan.path().cloned());
         let window = ExportWindow::after_failure(path, input, problem);
@@ -384,9 +401,9 @@ impl App {
 
     fn say_why(&mut self, what: &str, error: JobError) {
         match error {
-            JobError::Cancelled => self.messages.info(format!("{what}: cancelled.")),
+            JobError::Cancelled => self.messages.note(format!("{what}: cancelled.")),
             JobError::Failed(reason) => {
-                self.messages.error(format!("{what}: {}", sentence(&reason)));
+                self.messages.error(format!("{} {what}.", sentence(&reason)));
             }
         }
     }
@@ -407,7 +424,7 @@ impl App {
         }
         if session.scan.n_left_out > 0 {
             let rows = theme::counted(session.scan.n_left_out as u64, "row", "rows");
-            self.messages.info(format!(
+            self.messages.note(format!(
                 "{rows} with a coordinate that is not finite are left out; they stay in the file."
             ));
         }
@@ -423,8 +440,7 @@ impl App {
             cloud,
         } = propagation;
         let secs: f64 = propagation.seconds.iter().map(|(_, secs)| secs).sum();
-        session.document.install(propagation);
-        session.requested = session.document.parameters();
+        session.install(propagation);
         if let Some(scene) = &mut self.scene {
             self.mend.reset(scene);
             if let Err(error) = scene.show_document(session, cloud) {
@@ -434,12 +450,22 @@ impl App {
         }
         let n_points = theme::counted(session.scan.cloud.n_points() as u64, "point", "points");
         let time = Duration::from_secs_f64(secs.max(0.0)).as_secs_f32();
-        self.messages.info(format!("Oriented {n_points} in {time:.1} s."));
+        self.messages
+            .info(match (session.requested.start, session.n_without_normal) {
+                (Start::Keep, 0) => format!("Kept the given normals of {n_points} ({time:.1} s)."),
+                (Start::Keep, n_fitted) => format!(
+                    "Kept the given normals of {n_points}, {} of them fitted because the file has none ({time:.1} s).",
+                    theme::thousands(n_fitted as u64)
+                ),
+                (Start::Estimate, _) => format!("Oriented {n_points} in {time:.1} s."),
+            });
     }
 }
 
-/// `text` with a full stop.
+/// `text` with a capital letter and a full stop.
 fn sentence(text: &str) -> String {
     let stop = if text.ends_with('.') { "" } else { "." };
-    format!("{text}{stop}")
+    let mut letters = text.chars();
+    let first = letters.next().map(|letter| letter.to_uppercase().to_string());
+    format!("{}{}{stop}", first.unwrap_or_default(), letters.as_str())
 }

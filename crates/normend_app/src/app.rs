@@ -211,13 +211,13 @@ impl App {
                 .collect()
         });
         if dropped.len() > 1 {
-            self.messages.info("Only the first of the dropped files is opened.");
+            self.messages.note("Only the first of the dropped files is opened.");
         }
         if let Some(path) = dropped.into_iter().next() {
             if self.windows.modal.is_some() {
                 let name = ScanOrigin::File(path).name();
                 self.messages
-                    .info(format!("{name} was not opened: answer the open window first."));
+                    .note(format!("{name} was not opened: answer the open window first."));
                 return;
             }
             self.act(Action::OpenScan(path));
@@ -252,15 +252,13 @@ impl App {
             action = menu_bar::menus(ui, &availability, &self.settings.settings.recent);
         });
         Panel::top("toolbar").frame(frame).show(ui, |ui| {
-            let mut tool = self.tool;
             let document = self.document();
             let undo = document.and_then(Document::next_undo).map(|edit| edit.label());
             let redo = document.and_then(Document::next_redo).map(|edit| edit.label());
             let availability = |command| self.availability(command);
-            if let Some(chosen) = menu_bar::toolbar(ui, &availability, undo, redo, &mut tool) {
+            if let Some(chosen) = menu_bar::toolbar(ui, &availability, undo, redo, self.tool) {
                 action = Some(chosen);
             }
-            self.tool = tool;
         });
         Panel::bottom("status").frame(frame).show(ui, |ui| {
             status_bar::ui(ui, self.session.as_ref(), self.mend.n_would_turn(), &self.adapter);
@@ -286,6 +284,8 @@ impl App {
                 ScrollArea::vertical()
                     .auto_shrink([false, false])
                     .show(ui, |ui| {
+                        // The same with and without the bar.
+                        ui.set_max_width(theme::SIDE_PANEL_WIDTH - 2.0 * theme::SPACE_M - theme::SCROLL_WIDTH);
                         side::ui(ui, session, settings, mode, &palette, propagating, blocked)
                     })
                     .inner
@@ -444,8 +444,10 @@ impl App {
                 }
             },
             Some(Modal::Unsaved(leaving)) => {
-                let name = self.session.as_ref().map_or("this scan", |session| &session.name);
-                match unsaved::ui(ui, name) {
+                let session = self.session.as_ref();
+                let name = session.map_or("this scan", |session| &session.name);
+                let mends = session.is_none_or(Session::has_unsaved_mends);
+                match unsaved::ui(ui, name, mends) {
                     unsaved::Decision::Wait => self.windows.modal = Some(Modal::Unsaved(leaving)),
                     unsaved::Decision::Export => {
                         self.act(Command::Export.into());
@@ -481,7 +483,7 @@ impl App {
         if matches!(self.work, Some(Work::Export { .. })) {
             self.ctx.send_viewport_cmd(egui::ViewportCommand::CancelClose);
             self.after_export = Some(Leaving::Quit);
-            self.messages.info("The editor closes when the export is written.");
+            self.messages.note("The editor closes when the export is written.");
         } else if self.is_unsaved() {
             self.ctx.send_viewport_cmd(egui::ViewportCommand::CancelClose);
             // In place of another question: the window's own button comes through while one is open.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use egui::{Key, KeyboardShortcut, Modifiers};
+use egui::{Key, KeyboardShortcut, ModifierNames, Modifiers};
 use normend_core::Parameters;
 use normend_render::StandardView;
 
@@ -309,24 +309,46 @@ impl Command {
         let keys: Vec<_> = self
             .keys()
             .iter()
-            .map(|shortcut| ctx.format_shortcut(shortcut))
+            .map(|shortcut| shortcut_text(ctx, shortcut))
             .collect();
         keys.join(" or ")
     }
 }
 
-/// What the mouse does in the 3D view: the second half of the sheet of shortcuts.
+/// One shortcut as it is written on the keys ("Ctrl+Shift+Z", "+").
+pub fn shortcut_text(ctx: &egui::Context, shortcut: &KeyboardShortcut) -> String {
+    let is_mac = ctx.os().is_mac();
+    let held = ModifierNames::NAMES.format(&shortcut.modifiers, is_mac);
+    let plus = if held.is_empty() { "" } else { "+" };
+    let key = match shortcut.logical_key {
+        Key::Plus => "+",
+        Key::Minus => "−",
+        Key::Equals => "=",
+        Key::Period => ".",
+        Key::Questionmark => "?",
+        Key::ArrowLeft => "Left arrow",
+        Key::ArrowRight => "Right arrow",
+        Key::ArrowUp => "Up arrow",
+        Key::ArrowDown => "Down arrow",
+        Key::PageUp => "Page up",
+        Key::PageDown => "Page down",
+        key => key.name(),
+    };
+    format!("{held}{plus}{key}")
+}
+
+/// What the mouse does in the 3D view, and how: the first part of the sheet of shortcuts.
 pub const MOUSE: [(&str, &str); 10] = [
-    ("Move over the scan", "Show what a click would turn"),
-    ("Click", "Mend: turn the wrong region"),
-    ("Ctrl-click", "Turn all that hangs together"),
-    ("Click a source", "Select it; Shift adds to the selection"),
-    ("Left drag", "Orbit"),
-    ("Right, middle or Shift-left drag", "Pan"),
-    ("Wheel", "Zoom to the pointer"),
-    ("Alt-wheel", "Splat size"),
-    ("Double-click, middle click", "Turn the view around this point"),
-    ("Drop a file", "Open it (not on Wayland)"),
+    ("Show what a click would turn", "Move over the scan"),
+    ("Mend here", "Click"),
+    ("Turn whole region here", "Ctrl+click"),
+    ("Select a source (Shift adds)", "Click its sphere"),
+    ("Orbit", "Left drag"),
+    ("Pan", "Right, middle or Shift+left drag"),
+    ("Zoom to the pointer", "Wheel"),
+    ("Larger or smaller splats", "Alt+wheel"),
+    ("Turn around this point", "Double-click or middle click"),
+    ("Open a scan (not on Wayland)", "Drop its file"),
 ];
 
 /// Takes the commands out of the keyboard input. With `typing`, a text field has the keyboard and gets all keys but
@@ -403,6 +425,27 @@ mod tests {
                 .collect();
             assert!(!groups.is_empty());
             assert!(groups.is_sorted(), "{menu:?}: {groups:?}");
+        }
+    }
+
+    #[test]
+    fn keys_are_named_as_they_are_written() {
+        let ctx = egui::Context::default();
+        let check = |command: Command, expect: &str| assert_eq!(command.keys_text(&ctx), expect);
+        check(Command::Open, "Ctrl+O");
+        check(Command::Redo, "Ctrl+Shift+Z or Ctrl+Y");
+        check(Command::SetPivot, ".");
+        check(Command::LargerSplats, "+ or =");
+        check(Command::SmallerSplats, "−");
+        check(Command::Shortcuts, "F1 or ?");
+        check(Command::OrbitLeft, "Left arrow");
+        check(Command::About, "");
+    }
+
+    #[test]
+    fn menu_and_mouse_call_the_same_thing_the_same() {
+        for command in [Command::MendHere, Command::TurnWholeHere, Command::SetPivot] {
+            assert!(MOUSE.iter().any(|(what, _)| *what == command.label()), "{command:?}");
         }
     }
 

@@ -4,7 +4,9 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
     /// Something was done.
-    Info,
+    Done,
+    /// Something was not done, for a reason that is no failure, or is worth knowing.
+    Note,
     /// Something failed. Stays longer.
     Error,
 }
@@ -16,6 +18,8 @@ pub struct Message {
     pub level: Level,
     /// One or two sentences.
     pub text: String,
+    /// When it was said last, in seconds since the editor started.
+    pub at_secs: f64,
     /// How often it was said in a row.
     pub n_times: u32,
     /// Seconds since the editor started at which it leaves the view; `None` once it has left.
@@ -32,13 +36,21 @@ pub struct Messages {
 const MAX_ENTRIES: usize = 300;
 const INFO_SECS: f64 = 7.0;
 const ERROR_SECS: f64 = 30.0;
+const MAX_SHOWN_ERRORS: usize = 2;
 
 impl Messages {
     /// Says that something was done.
     pub fn info(&mut self, text: impl Into<String>) {
         let text = text.into();
         tracing::debug!("{text}");
-        self.push(Level::Info, text, Some(self.now + INFO_SECS));
+        self.push(Level::Done, text, Some(self.now + INFO_SECS));
+    }
+
+    /// Says what was not done and why, or what is worth knowing.
+    pub fn note(&mut self, text: impl Into<String>) {
+        let text = text.into();
+        tracing::debug!("{text}");
+        self.push(Level::Note, text, Some(self.now + INFO_SECS));
     }
 
     /// Says what failed and what to do.
@@ -61,6 +73,7 @@ impl Messages {
             && last.text == text
         {
             last.n_times += 1;
+            last.at_secs = self.now;
             last.shown_until = shown_until;
             return;
         }
@@ -70,9 +83,15 @@ impl Messages {
         self.entries.push(Message {
             level,
             text,
+            at_secs: self.now,
             n_times: 1,
             shown_until,
         });
+        // Only the newest errors stand in the view's way; the log keeps all.
+        let shown = |entry: &&mut Message| entry.level == Level::Error && entry.shown_until.is_some();
+        for entry in self.entries.iter_mut().rev().filter(shown).skip(MAX_SHOWN_ERRORS) {
+            entry.shown_until = None;
+        }
     }
 
     /// Lets messages leave the view whose time is over at `now` (seconds since the editor started).
@@ -120,6 +139,20 @@ mod tests {
         assert_eq!(shown, [false, true]);
         assert_eq!(messages.tick(ERROR_SECS), None);
         assert_eq!(messages.entries().len(), 2, "the log keeps them");
+    }
+
+    #[test]
+    fn two_errors_at_most_are_in_view() {
+        let mut messages = Messages::default();
+        messages.tick(2.5);
+        for text in ["one", "two", "three"] {
+            messages.error(text);
+        }
+        messages.note("four");
+        let entries = messages.entries().iter();
+        let shown: Vec<_> = entries.map(|entry| entry.shown_until.is_some()).collect();
+        assert_eq!(shown, [false, true, true, true]);
+        assert!(messages.entries().iter().all(|entry| entry.at_secs == 2.5));
     }
 
     #[test]

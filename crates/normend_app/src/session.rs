@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use normend_core::{Change, Document, Edit, EditError, Parameters, Start};
+use normend_core::{Change, Document, Edit, EditError, Parameters, Propagation, Start};
 use normend_io::Scan;
 
 /// An open scan.
@@ -21,7 +21,13 @@ pub struct Session {
     pub requested: Parameters,
     /// Points whose source is selected.
     pub selected: BTreeSet<u32>,
+    /// The source that the last edit made, until the list has shown it.
+    pub reveal: Option<u32>,
+    /// Points without a normal in the file, which is fitted also where given normals are kept.
+    pub n_without_normal: usize,
     saved_revision: u64,
+    /// As exported last, or of the first propagation; `None` before that.
+    saved_parameters: Option<Parameters>,
 }
 
 impl Session {
@@ -37,8 +43,15 @@ impl Session {
             },
             ..Parameters::default()
         };
+        let n_points = scan.cloud.n_points();
+        let n_without_normal = scan.given_normals.as_ref().map_or(n_points, |normals| {
+            normals.iter().filter(|&&normal| normal == glam::Vec3::ZERO).count()
+        });
         Self {
+            reveal: None,
+            n_without_normal,
             saved_revision: document.revision(),
+            saved_parameters: None,
             scan: Arc::new(scan),
             name,
             document,
@@ -48,14 +61,32 @@ impl Session {
         }
     }
 
-    /// Whether there are mends that no exported file has.
+    /// Whether there are mends, or another propagation than the first, that no exported file has.
     pub fn is_unsaved(&self) -> bool {
+        self.has_unsaved_mends() || self.has_unsaved_propagation()
+    }
+
+    /// Whether there are mends that no exported file has.
+    pub fn has_unsaved_mends(&self) -> bool {
         self.document.revision() != self.saved_revision
     }
 
-    /// Remembers that the sources of `revision` are in an exported file.
-    pub fn mark_saved(&mut self, revision: u64) {
+    fn has_unsaved_propagation(&self) -> bool {
+        self.saved_parameters
+            .is_some_and(|saved| saved != self.document.parameters())
+    }
+
+    /// Remembers that the sources of `revision` with `parameters` are in an exported file.
+    pub fn mark_saved(&mut self, revision: u64, parameters: Parameters) {
         self.saved_revision = revision;
+        self.saved_parameters = Some(parameters);
+    }
+
+    /// Makes a propagation the one in force. The first is what the file is without the user, so it is nothing to lose.
+    pub fn install(&mut self, propagation: Propagation) {
+        self.document.install(propagation);
+        self.requested = self.document.parameters();
+        self.saved_parameters.get_or_insert(self.requested);
     }
 
     /// Applies an edit and keeps the selection to points that are sources.
@@ -63,7 +94,12 @@ impl Session {
     /// # Errors
     /// As [`Document::apply`].
     pub fn apply(&mut self, edit: Edit) -> Result<Change, EditError> {
+        let made = match edit {
+            Edit::Mend(point) | Edit::TurnWhole(point) => Some(point),
+            _ => None,
+        };
         let change = self.document.apply(edit)?;
+        self.reveal = made;
         self.prune_selection();
         Ok(change)
     }
@@ -114,7 +150,18 @@ impl Session {
             |extension| extension.to_string_lossy().into_owned(),
         );
         let beside = self.scan.path().and_then(|path| path.parent()).map(Path::to_path_buf);
-        let folder = folder.map(Path::to_path_buf).or(beside).unwrap_or_default();
+        let folder = folder
+            .map(Path::to_path_buf)
+            .or(beside)
+            .or_else(documents)
+            .unwrap_or_default();
         folder.join(format!("{stem}_oriented.{extension}"))
     }
+}
+
+/// The user's folder for documents, else the home folder.
+fn documents() -> Option<PathBuf> {
+    let folders = directories::UserDirs::new()?;
+    let documents = folders.document_dir().filter(|folder| folder.is_dir());
+    Some(documents.unwrap_or_else(|| folders.home_dir()).to_path_buf())
 }

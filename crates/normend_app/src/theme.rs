@@ -18,6 +18,12 @@ pub const SPACE_L: f32 = 16.0;
 pub const SIDE_PANEL_WIDTH: f32 = 324.0;
 /// Width of the first column of label/value rows, in points.
 pub const LABEL_WIDTH: f32 = 104.0;
+/// Width of the scroll bar beside a panel, in points.
+pub const SCROLL_WIDTH: f32 = 6.0;
+/// Width of the second column, where inputs end at the same right edge, in points.
+pub const VALUE_WIDTH: f32 = SIDE_PANEL_WIDTH - 2.0 * SPACE_M - SCROLL_WIDTH - LABEL_WIDTH - SPACE_S;
+/// Width of the number beside a slider, in points.
+const SLIDER_VALUE_WIDTH: f32 = 52.0;
 /// Height of rows that are only read, in points.
 pub const FACT_HEIGHT: f32 = 18.0;
 
@@ -99,8 +105,13 @@ pub fn apply(ctx: &egui::Context) {
         style.spacing.window_margin = Margin::same(SPACE_L as i8);
         style.spacing.menu_margin = Margin::same(SPACE_XS as i8);
         style.spacing.interact_size = Vec2::new(40.0, 26.0);
-        style.spacing.combo_width = 168.0;
-        style.spacing.slider_width = 100.0;
+        style.spacing.combo_width = VALUE_WIDTH;
+        style.spacing.slider_width = VALUE_WIDTH - SPACE_S - SLIDER_VALUE_WIDTH;
+        // A bar that shows that there is more, without the pointer over it.
+        style.spacing.scroll = egui::style::ScrollStyle {
+            floating_allocated_width: SCROLL_WIDTH,
+            ..egui::style::ScrollStyle::thin()
+        };
         style.interaction.selectable_labels = false;
     });
     for theme in [Theme::Dark, Theme::Light] {
@@ -191,11 +202,19 @@ pub fn panel_frame(style: &egui::Style) -> egui::Frame {
 
 /// A section of the side panel: a heading, its rows, and room below.
 pub fn section<R>(ui: &mut Ui, title: &str, rows: impl FnOnce(&mut Ui) -> R) -> R {
+    section_about(ui, title, "", rows)
+}
+
+/// A [`section`] whose heading explains itself when the pointer rests on it.
+pub fn section_about<R>(ui: &mut Ui, title: &str, about: &str, rows: impl FnOnce(&mut Ui) -> R) -> R {
     let text = RichText::new(title)
         .size(15.0)
         .color(ui.visuals().strong_text_color())
         .strong();
-    ui.add(egui::Label::new(text));
+    let heading = ui.add(egui::Label::new(text));
+    if !about.is_empty() {
+        heading.on_hover_text(about);
+    }
     ui.add_space(SPACE_XS);
     let result = rows(ui);
     ui.add_space(SPACE_L);
@@ -265,9 +284,32 @@ pub fn counted(number: u64, singular: &str, plural: &str) -> String {
     format!("{} {}", thousands(number), if number == 1 { singular } else { plural })
 }
 
+/// A file's name of at most `max_chars` characters: the middle of a longer one is left out, so that its end and
+/// extension stay.
+pub fn elided(name: &str, max_chars: usize) -> String {
+    let n_chars = name.chars().count();
+    if n_chars <= max_chars {
+        return name.to_owned();
+    }
+    let n_last = max_chars.saturating_sub(1) / 2;
+    let n_first = max_chars.saturating_sub(1) - n_last;
+    let first: String = name.chars().take(n_first).collect();
+    let last: String = name.chars().skip(n_chars - n_last).collect();
+    format!("{first}…{last}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_names_keep_their_ends() {
+        let check = |name, expect: &str| assert_eq!(elided(name, 9), expect);
+        check("scan.ply", "scan.ply");
+        check("scan1.ply", "scan1.ply");
+        check("a long scan.ply", "a lo….ply");
+        check("äöüäöüäöüäöü", "äöüä…üäöü");
+    }
 
     #[test]
     fn numbers_have_separators() {

@@ -35,6 +35,20 @@ impl ScanOrigin {
             Self::Sample => SAMPLE_NAME.to_owned(),
         }
     }
+
+    /// How errors of reading it begin.
+    fn display(&self) -> String {
+        match self {
+            Self::File(path) => path.display().to_string(),
+            Self::Sample => SAMPLE_NAME.to_owned(),
+        }
+    }
+}
+
+/// `reason` without the file that it begins with, which the message around it names shortly.
+fn without_file(reason: &str, file: &str) -> String {
+    let rest = reason.strip_prefix(file).unwrap_or(reason);
+    rest.trim_start_matches([':', ',', ' ']).to_owned()
 }
 
 /// A result with its picture's points, already on the GPU. `None` when there is no GPU or it had no room beside the
@@ -65,6 +79,8 @@ pub enum Work {
         path: PathBuf,
         /// The document's revision that is written.
         revision: u64,
+        /// The parameters that it was propagated with.
+        parameters: Parameters,
     },
 }
 
@@ -79,8 +95,9 @@ impl Work {
             };
             let scan = scan.map_err(|error| match error {
                 ReadError::Cancelled(_) => JobError::Cancelled,
-                error => JobError::Failed(error.to_string()),
+                error => JobError::Failed(without_file(&error.to_string(), &source.display())),
             })?;
+            progress.stage("Preparing the picture");
             let cloud = uploader.and_then(|uploader| upload_points(&uploader, &scan.cloud).ok());
             Ok(Uploaded { result: scan, cloud })
         });
@@ -99,7 +116,7 @@ impl Work {
         Self::Propagate(Job::start(ctx, "propagate", "Finding neighbors", move |progress| {
             let given = given.as_ref().map(|normals| normals.as_slice());
             let propagation = Propagation::new(&cloud, given, parameters, progress)?;
-            progress.stage("Sending to the graphics adapter");
+            progress.stage("Preparing the picture");
             let uploaded = uploader.and_then(|uploader| upload_oriented(&uploader, &cloud, &propagation).ok());
             Ok(Uploaded {
                 result: propagation,
@@ -121,13 +138,14 @@ impl Work {
             scan.write(&normals, &target, &options, progress)
                 .map_err(|error| match error {
                     WriteError::Cancelled(_) => JobError::Cancelled,
-                    error => JobError::Failed(error.to_string()),
+                    error => JobError::Failed(without_file(&error.to_string(), &target.display().to_string())),
                 })
         });
         Some(Self::Export {
             job,
             path: path.to_path_buf(),
             revision: session.document.revision(),
+            parameters: session.document.parameters(),
         })
     }
 

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use egui::{Button, RichText, Ui};
 
 use super::Availability;
-use crate::command::{Action, Command, Menu};
-use crate::theme::{SPACE_S, SPACE_XS};
+use crate::command::{Action, Command, Menu, shortcut_text};
+use crate::theme::{self, SPACE_S, SPACE_XS};
 use crate::tools::Tool;
 
 /// The menu bar. `recent` are the scans opened last.
@@ -41,7 +41,7 @@ fn item(ui: &mut Ui, command: Command, availability: &Availability<'_>) -> bool 
     let available = availability(command);
     let mut button = Button::new(command.label());
     if let Some(shortcut) = command.keys().first() {
-        button = button.shortcut_text(ui.ctx().format_shortcut(shortcut));
+        button = button.shortcut_text(shortcut_text(ui.ctx(), shortcut));
     }
     let response = ui.add_enabled(available.is_ok(), button);
     match available {
@@ -60,7 +60,9 @@ fn recent_menu(ui: &mut Ui, recent: &[PathBuf]) -> Option<Action> {
                     .unwrap_or(path.as_os_str())
                     .to_string_lossy()
                     .into_owned();
-                if ui.button(name).on_hover_text(path.display().to_string()).clicked() {
+                let folder = path.parent().unwrap_or(path).display().to_string();
+                let button = Button::new(theme::elided(&name, 40)).shortcut_text(theme::elided(&folder, 40));
+                if ui.add(button).on_hover_text(path.display().to_string()).clicked() {
                     action = Some(Action::OpenScan(path.clone()));
                 }
             }
@@ -73,13 +75,13 @@ fn recent_menu(ui: &mut Ui, recent: &[PathBuf]) -> Option<Action> {
     action
 }
 
-/// The toolbar: the commands used most, and the tools. `undo` and `redo` name the edits that would be undone and redone.
+/// The toolbar: the commands used most, and what the tool does. `undo` and `redo` name the edits that would be undone and redone.
 pub fn toolbar(
     ui: &mut Ui,
     availability: &Availability<'_>,
     undo: Option<&str>,
     redo: Option<&str>,
-    tool: &mut Tool,
+    tool: Tool,
 ) -> Option<Action> {
     let mut action = None;
     ui.horizontal(|ui| {
@@ -112,17 +114,7 @@ pub fn toolbar(
             }
         }
         divider(ui);
-        ui.label(RichText::new("Tool").weak());
-        for each in Tool::ALL {
-            let selected = *tool == each;
-            if ui
-                .add(Button::selectable(selected, each.label()))
-                .on_hover_text(each.tooltip())
-                .clicked()
-            {
-                *tool = each;
-            }
-        }
+        ui.add(egui::Label::new(RichText::new(tool.hint()).weak()).truncate());
     });
     action
 }

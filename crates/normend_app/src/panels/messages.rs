@@ -41,7 +41,7 @@ pub fn toasts(ui: &Ui, view: Rect, messages: &mut Messages) {
                         }
                         ui.with_layout(Layout::top_down(Align::Min), |ui| {
                             let color = match entry.level {
-                                Level::Info => ui.visuals().text_color(),
+                                Level::Done | Level::Note => ui.visuals().text_color(),
                                 Level::Error => ui.visuals().error_fg_color,
                             };
                             ui.add(Label::new(RichText::new(text(entry)).color(color)).wrap());
@@ -58,6 +58,12 @@ fn text(message: &Message) -> String {
     } else {
         message.text.clone()
     }
+}
+
+/// Seconds as "1:02:03".
+fn clock(secs: f64) -> String {
+    let secs = secs.max(0.0) as u64;
+    format!("{}:{:02}:{:02}", secs / 3600, secs / 60 % 60, secs % 60)
 }
 
 /// The window with all messages of this run.
@@ -77,14 +83,18 @@ pub fn log(ui: &Ui, open: &mut bool, messages: &Messages) {
                 .stick_to_bottom(true)
                 .show(ui, |ui| {
                     egui::Grid::new("log")
-                        .num_columns(2)
+                        .num_columns(3)
                         .spacing([SPACE_M, SPACE_S])
                         .show(ui, |ui| {
                             for entry in messages.entries() {
                                 let (name, color) = match entry.level {
-                                    Level::Info => ("Done", ui.visuals().weak_text_color()),
+                                    Level::Done => ("Done", ui.visuals().weak_text_color()),
+                                    Level::Note => ("Note", ui.visuals().weak_text_color()),
                                     Level::Error => ("Error", ui.visuals().error_fg_color),
                                 };
+                                let time = RichText::new(clock(entry.at_secs)).monospace().weak();
+                                ui.label(time)
+                                    .on_hover_text("Hours, minutes and seconds since the editor started");
                                 ui.label(RichText::new(name).color(color));
                                 ui.add(Label::new(text(entry)).wrap().selectable(true));
                                 ui.end_row();
@@ -92,4 +102,15 @@ pub fn log(ui: &Ui, open: &mut bool, messages: &Messages) {
                         });
                 });
         });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::clock;
+
+    #[test]
+    fn the_clock_counts_hours_minutes_and_seconds() {
+        assert_eq!(clock(0.9), "0:00:00");
+        assert_eq!(clock(3723.0), "1:02:03");
+    }
 }

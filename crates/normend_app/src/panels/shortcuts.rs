@@ -5,22 +5,36 @@ use egui::{Align2, RichText, ScrollArea, Ui, Vec2};
 use crate::command::{Command, MOUSE, Menu};
 use crate::theme::{self, SPACE_L, SPACE_XS};
 
-/// Width of each column, so that they align from section to section.
-const SHEET_COLUMN: f32 = 236.0;
+/// Width of what is done and of the keys, so that they align from section to section.
+const COLUMN: f32 = 208.0;
+/// What two columns of sections need, with the window's margins.
+const WIDE: f32 = 2.0 * (2.0 * COLUMN + SPACE_L) + 8.0 * SPACE_L;
+/// The title bar and the margins above and below the sheet.
+const AROUND: f32 = 112.0;
 
 /// The window with every key and what the mouse does.
 pub fn ui(ui: &Ui, open: &mut bool) {
+    let room = ui.ctx().content_rect();
     egui::Window::new("Keys and mouse")
         .open(open)
         .collapsible(false)
         .resizable(false)
         .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
         .show(ui.ctx(), |ui| {
-            let height = (ui.ctx().content_rect().height() - 140.0).max(200.0);
+            let height = (room.height() - AROUND).max(160.0);
             ScrollArea::vertical()
                 .max_height(height)
                 .min_scrolled_height(height)
                 .show(ui, |ui| {
+                    if room.width() < WIDE {
+                        ui.vertical(|ui| {
+                            mouse(ui);
+                            for menu in Menu::ALL {
+                                keys(ui, menu);
+                            }
+                        });
+                        return;
+                    }
                     ui.horizontal_top(|ui| {
                         ui.spacing_mut().item_spacing.x = 2.0 * SPACE_L;
                         ui.vertical(|ui| {
@@ -40,11 +54,7 @@ pub fn ui(ui: &Ui, open: &mut bool) {
 
 fn mouse(ui: &mut Ui) {
     theme::section(ui, "Mouse", |ui| {
-        sheet(
-            ui,
-            "mouse",
-            MOUSE.into_iter().map(|(does, what)| (what, does.to_owned())),
-        );
+        sheet(ui, "mouse", MOUSE.into_iter().map(|(what, how)| (what, how.to_owned())));
     });
 }
 
@@ -63,7 +73,7 @@ fn keys(ui: &mut Ui, menu: Menu) {
 fn sheet(ui: &mut Ui, id: &str, rows: impl Iterator<Item = (&'static str, String)>) {
     egui::Grid::new(id)
         .num_columns(2)
-        .min_col_width(SHEET_COLUMN)
+        .min_col_width(COLUMN)
         .min_row_height(theme::FACT_HEIGHT)
         .spacing([SPACE_L, SPACE_XS])
         .show(ui, |ui| {

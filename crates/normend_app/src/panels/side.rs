@@ -1,6 +1,6 @@
 //! The side panel: the scan, the propagation's parameters, the sources, the view.
 
-use egui::{Button, Color32, ComboBox, DragValue, RichText, Slider, Ui, Vec2};
+use egui::{Button, Color32, ComboBox, DragValue, RichText, Slider, Stroke, StrokeKind, Ui, Vec2};
 use normend_core::{EdgeRule, Estimator, Parameters, Start};
 use normend_render::{DisplayMode, Palette};
 
@@ -11,6 +11,9 @@ use crate::settings::{PaletteChoice, SPLAT_SCALES, Settings, ThemeChoice};
 use crate::theme::{self, SPACE_S, SPACE_XS};
 
 const K_NORMALS: std::ops::RangeInclusive<usize> = 3..=64;
+/// Width of the button to keep given normals, in points; the other one takes the rest of the column.
+const KEEP_WIDTH: f32 = 94.0;
+const NOTHING_IS_FITTED: &str = "Nothing is fitted: every normal of the file is kept";
 const K_GRAPH: std::ops::RangeInclusive<usize> = 1..=32;
 
 /// The side panel. `propagating` says that a propagation runs, `blocked` why none can be started.
@@ -28,7 +31,7 @@ pub fn ui(
     if let Some(chosen) = theme::section(ui, "Propagation", |ui| propagation(ui, session, propagating, blocked)) {
         action = Some(chosen);
     }
-    if let Some(chosen) = theme::section(ui, "Sources", |ui| sources::ui(ui, session)) {
+    if let Some(chosen) = theme::section_about(ui, "Sources", sources::ABOUT, |ui| sources::ui(ui, session)) {
         action = Some(chosen);
     }
     theme::section(ui, "View", |ui| view(ui, settings, mode, palette));
@@ -40,7 +43,7 @@ fn scan(ui: &mut Ui, session: &Session) {
         theme::row(
             ui,
             "File",
-            format!("{} ({})", session.name, session.scan.format.label()),
+            format!("{} ({})", theme::elided(&session.name, 24), session.scan.format.label()),
         );
         theme::row(ui, "Points", theme::thousands(session.scan.cloud.n_points() as u64));
         if session.scan.n_left_out > 0 {
@@ -85,20 +88,26 @@ impl std::fmt::Display for Short {
 fn propagation(ui: &mut Ui, session: &mut Session, propagating: bool, blocked: Option<&str>) -> Option<Action> {
     let has_normals = session.scan.given_normals.is_some();
     let draft = &mut session.draft;
+    let fits = draft.start != Start::Keep || session.n_without_normal > 0;
     theme::rows(ui, "propagation", |ui| {
         start_row(ui, draft, has_normals);
         theme::input_row(ui, "Estimator", "How a normal is fitted to its neighbors", |ui| {
-            ComboBox::from_id_salt("estimator")
-                .selected_text(draft.estimator.label())
-                .show_ui(ui, |ui| {
-                    for each in Estimator::ALL {
-                        ui.selectable_value(&mut draft.estimator, each, each.label());
-                    }
-                })
-                .response
+            let combo = ComboBox::from_id_salt("estimator").selected_text(draft.estimator.label());
+            let show = |ui: &mut Ui| {
+                combo
+                    .show_ui(ui, |ui| {
+                        for each in Estimator::ALL {
+                            ui.selectable_value(&mut draft.estimator, each, each.label());
+                        }
+                    })
+                    .response
+            };
+            let response = ui.add_enabled_ui(fits, show).inner;
+            response.on_disabled_hover_text(NOTHING_IS_FITTED)
         });
         theme::input_row(ui, "k for normals", "Neighbors that a normal is fitted to", |ui| {
-            ui.add(DragValue::new(&mut draft.k_normals).range(K_NORMALS).speed(0.1))
+            let k = DragValue::new(&mut draft.k_normals).range(K_NORMALS).speed(0.1);
+            ui.add_enabled(fits, k).on_disabled_hover_text(NOTHING_IS_FITTED)
         });
         theme::input_row(
             ui,
@@ -145,9 +154,9 @@ fn propagation(ui: &mut Ui, session: &mut Session, propagating: bool, blocked: O
             *draft = session.requested;
         }
     });
-    if changed {
-        ui.label(RichText::new("Changed, not applied yet").color(ui.visuals().warn_fg_color));
-    }
+    // The line is there with or without words, so that what stands below stays where it is.
+    let hint = if changed { "Changed, not applied yet" } else { "" };
+    ui.label(RichText::new(hint).color(ui.visuals().warn_fg_color));
     action
 }
 
@@ -158,7 +167,9 @@ fn start_row(ui: &mut Ui, draft: &mut Parameters, has_normals: bool) {
         ui.spacing_mut().item_spacing.x = SPACE_XS;
         for each in Start::ALL {
             let possible = each != Start::Keep || has_normals;
-            let button = Button::selectable(draft.start == each, each.label());
+            let rest = theme::VALUE_WIDTH - SPACE_XS - KEEP_WIDTH;
+            let width = if each == Start::Keep { KEEP_WIDTH } else { rest };
+            let button = Button::selectable(draft.start == each, each.label()).min_size(Vec2::new(width, 0.0));
             let response = ui.add_enabled(possible, button);
             let tooltip = match each {
                 Start::Estimate => "Fit normals to the points and orient them",
@@ -231,6 +242,9 @@ fn swatch(ui: &mut Ui, color: [f32; 3], label: &str) {
     let (rect, _) = ui.allocate_exact_size(Vec2::splat(14.0), egui::Sense::hover());
     let [r, g, b] = color.map(|channel| (channel * 255.0).round() as u8);
     ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(r, g, b));
+    // A front or back as dark or as bright as the panel has an edge.
+    let edge = Stroke::new(1.0, ui.visuals().weak_text_color());
+    ui.painter().rect_stroke(rect, 3.0, edge, StrokeKind::Inside);
     ui.label(label);
 }
 

@@ -10,8 +10,14 @@ use crate::theme::{self, SPACE_S, SPACE_XS};
 const ROW_HEIGHT: f32 = 24.0;
 const LIST_HEIGHT: f32 = 180.0;
 
+/// What the words of the rows mean.
+pub const ABOUT: &str = "Points whose side you decided.\nFlipped: the source turned its point.\n\
+                         Kept: it holds the side that the point has without sources.";
+
 /// The list and its buttons.
-pub fn ui(ui: &mut Ui, session: &Session) -> Option<Action> {
+pub fn ui(ui: &mut Ui, session: &mut Session) -> Option<Action> {
+    let reveal = session.reveal.take();
+    let session = &*session;
     let sources = session.document.sources();
     if sources.is_empty() {
         let hint = "None yet. Click a wrong region in the view: it turns, and its point becomes a source.";
@@ -49,31 +55,36 @@ pub fn ui(ui: &mut Ui, session: &Session) -> Option<Action> {
         }
     });
     ui.add_space(SPACE_XS);
-    ScrollArea::vertical()
+    let mut list = ScrollArea::vertical()
         .id_salt("sources")
         .max_height(LIST_HEIGHT)
-        .auto_shrink([false, true])
-        .show_rows(ui, ROW_HEIGHT, sources.len(), |ui, rows| {
-            for source in sources.iter().skip(rows.start).take(rows.len()) {
-                let flipped = session.document.is_flipped(source);
-                let response = row(
-                    ui,
-                    source.point,
-                    flipped,
-                    source.origin,
-                    session.selected.contains(&source.point),
-                );
-                if response.double_clicked() {
-                    action = Some(Action::FlyTo(source.point));
-                } else if response.clicked() {
-                    let extend = ui.input(|input| input.modifiers.shift || input.modifiers.command);
-                    action = Some(Action::SelectSource {
-                        point: source.point,
-                        extend,
-                    });
-                }
+        .auto_shrink([false, true]);
+    // A source that was just made is brought into the middle of the list.
+    if let Some(index) = reveal.and_then(|point| sources.iter().position(|source| source.point == point)) {
+        let pitch = ROW_HEIGHT + ui.spacing().item_spacing.y;
+        list = list.vertical_scroll_offset((index as f32 * pitch - 0.5 * (LIST_HEIGHT - pitch)).max(0.0));
+    }
+    list.show_rows(ui, ROW_HEIGHT, sources.len(), |ui, rows| {
+        for source in sources.iter().skip(rows.start).take(rows.len()) {
+            let flipped = session.document.is_flipped(source);
+            let response = row(
+                ui,
+                source.point,
+                flipped,
+                source.origin,
+                session.selected.contains(&source.point),
+            );
+            if response.double_clicked() {
+                action = Some(Action::FlyTo(source.point));
+            } else if response.clicked() {
+                let extend = ui.input(|input| input.modifiers.shift || input.modifiers.command);
+                action = Some(Action::SelectSource {
+                    point: source.point,
+                    extend,
+                });
             }
-        });
+        }
+    });
     action
 }
 

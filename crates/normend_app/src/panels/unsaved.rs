@@ -18,11 +18,23 @@ pub enum Decision {
     Cancel,
 }
 
-/// Asks about the mends of the scan called `name`.
-pub fn ui(ui: &Ui, name: &str) -> Decision {
-    modal::show(ui, "Unsaved mends", 400.0, |ui| {
+/// Asks about the scan called `name`: about its mends, or else about its new propagation.
+pub fn ui(ui: &Ui, name: &str, mends: bool) -> Decision {
+    let name = theme::elided(name, 60);
+    let (title, what) = if mends {
+        (
+            "Unsaved mends",
+            format!("The mends of {name} are in no exported file yet."),
+        )
+    } else {
+        (
+            "Unsaved propagation",
+            format!("The new propagation of {name} is in no exported file yet."),
+        )
+    };
+    modal::show(ui, title, 400.0, |ui| {
         let mut decision = Decision::Wait;
-        ui.add(Label::new(format!("The mends of {name} are in no exported file yet.")).wrap());
+        ui.add(Label::new(what).wrap());
         ui.add_space(SPACE_S);
         ui.horizontal(|ui| {
             let enter = modal::enter_pressed(ui);

@@ -2,7 +2,7 @@
 
 pub mod mend;
 
-/// A tool of the toolbar.
+/// What the pointer is for in the 3D view.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tool {
     /// Turn the wrong region under the pointer.
@@ -11,20 +11,10 @@ pub enum Tool {
 }
 
 impl Tool {
-    /// All tools, in the order of the toolbar.
-    pub const ALL: [Self; 1] = [Self::Mend];
-
-    /// The name in the toolbar.
-    pub fn label(self) -> &'static str {
+    /// How it is used, in one line.
+    pub fn hint(self) -> &'static str {
         match self {
-            Self::Mend => "Mend",
-        }
-    }
-
-    /// What it does, in a few words.
-    pub fn tooltip(self) -> &'static str {
-        match self {
-            Self::Mend => "Point at a wrong region: what a click would turn is highlighted. Click to turn it.",
+            Self::Mend => "Mend: point at a wrong region, click to turn what is highlighted",
         }
     }
 }
