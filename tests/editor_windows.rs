@@ -15,7 +15,7 @@ use egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
 use normend_app::messages::Level;
 
-use driver::{sphere_with_wrong_cap, start};
+use driver::{sphere_with_wrong_cap, sphere_without_normals, start};
 
 #[test]
 fn nothing_acts_behind_an_open_question() {
@@ -140,7 +140,8 @@ fn a_failed_export_keeps_the_path_and_says_why() {
     editor.wait("the end of the export", |app| !app.is_busy());
     editor.harness.run_steps(2);
     assert_eq!(editor.export_path(), Some(target.display().to_string()));
-    assert!(editor.shows("Nothing was exported"));
+    assert!(editor.shows("The target lies in a folder that does not exist"));
+    assert!(editor.shows("mended.ply was not written."));
     // The folder is made meanwhile, and Enter tries again.
     fs::create_dir(target.parent().unwrap()).unwrap();
     editor.key(Modifiers::NONE, Key::Enter);
@@ -177,6 +178,56 @@ fn the_sheet_fits_into_the_smallest_window() {
         assert!(titles.iter().all(|rect| rect.top() > 0.0), "{titles:?} {size:?}");
         editor.key(Modifiers::NONE, Key::Escape);
     }
+}
+
+#[test]
+fn the_sample_is_exported_to_a_folder_of_the_user() {
+    let Some(mut editor) = start(|_| None) else { return };
+    editor.click_button("Try the sample");
+    editor.wait_until_oriented();
+    editor.key(Modifiers::COMMAND, Key::E);
+    let path = std::path::PathBuf::from(editor.export_path().unwrap());
+    assert!(path.ends_with("sample_oriented.ply"));
+    assert!(
+        path.is_absolute() && path.parent().unwrap().is_dir(),
+        "{}",
+        path.display()
+    );
+}
+
+#[test]
+fn the_newest_source_is_in_sight_in_the_list() {
+    let Some(mut editor) = start(|folder| Some(sphere_without_normals(folder, "bare.ply", 4000))) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    editor.harness.set_size(egui::Vec2::new(1000.0, 1400.0));
+    editor.harness.run_steps(4);
+    let middle = editor.app().view_rect().center();
+    let mut known = std::collections::BTreeSet::new();
+    for step in 0..24 {
+        let angle = step as f32 * 2.4;
+        editor.click(middle + 12.0 * (step as f32).sqrt() * 3.0 * egui::Vec2::angled(angle));
+        editor.harness.run_steps(30);
+        let sources = editor.app().document().unwrap().sources().iter();
+        let points: std::collections::BTreeSet<_> = sources.map(|source| source.point).collect();
+        for &point in points.difference(&known) {
+            let row = format!("Point {}", normend_app::theme::thousands(u64::from(point)));
+            let rect = editor
+                .harness
+                .get_all_by_label_contains(&row)
+                .next()
+                .map(|node| node.rect());
+            let list = editor.harness.get_by_label("Display").rect();
+            assert!(rect.is_some_and(|rect| rect.bottom() < list.top()), "{row} at {rect:?}");
+        }
+        known = points;
+    }
+    assert!(
+        known.len() > 12,
+        "only {} sources: the list did not need to scroll",
+        known.len()
+    );
 }
 
 #[test]

@@ -392,7 +392,8 @@ impl App {
 
     /// Asks for the target once more after an export failed, with the same path and the reason.
     fn export_again(&mut self, path: &std::path::Path, reason: &str) {
-        let problem = format!("{} Nothing was exported.", sentence(reason));
+        let name = ScanOrigin::File(path.to_path_buf()).name();
+        let problem = format!("{} {} was not written.", sentence(reason), theme::elided(&name, 48));
         self.messages.log_error(problem.clone());
         let input = self.session.as_ref().and_then(|session| session.scan.path().cloned());
         let window = ExportWindow::after_failure(path, input, problem);

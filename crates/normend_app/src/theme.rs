@@ -110,6 +110,8 @@ pub fn apply(ctx: &egui::Context) {
         // A bar that shows that there is more, without the pointer over it.
         style.spacing.scroll = egui::style::ScrollStyle {
             floating_allocated_width: SCROLL_WIDTH,
+            foreground_color: true,
+            dormant_handle_opacity: 0.5,
             ..egui::style::ScrollStyle::thin()
         };
         style.interaction.selectable_labels = false;

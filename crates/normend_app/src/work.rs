@@ -51,6 +51,14 @@ fn without_file(reason: &str, file: &str) -> String {
     rest.trim_start_matches([':', ',', ' ']).to_owned()
 }
 
+/// `reason` with the file that it begins with as "the target", because the message around it names it shortly.
+fn about_target(reason: &str, file: &str) -> String {
+    match reason.strip_prefix(file) {
+        Some(rest) => format!("The target{rest}"),
+        None => reason.to_owned(),
+    }
+}
+
 /// A result with its picture's points, already on the GPU. `None` when there is no GPU or it had no room beside the
 /// present cloud.
 pub struct Uploaded<T> {
@@ -138,7 +146,7 @@ impl Work {
             scan.write(&normals, &target, &options, progress)
                 .map_err(|error| match error {
                     WriteError::Cancelled(_) => JobError::Cancelled,
-                    error => JobError::Failed(without_file(&error.to_string(), &target.display().to_string())),
+                    error => JobError::Failed(about_target(&error.to_string(), &target.display().to_string())),
                 })
         });
         Some(Self::Export {
@@ -179,5 +187,20 @@ impl Work {
             Self::Propagate(job) => job.cancel(),
             Self::Export { job, .. } => job.cancel(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_leave_the_naming_of_the_file_to_the_message() {
+        let check = |reason, expect: &str| assert_eq!(without_file(reason, "/a/b.ply"), expect);
+        check("/a/b.ply, line 3: no end_header", "line 3: no end_header");
+        check("/a/b.ply: there is no such file", "there is no such file");
+        check("something else", "something else");
+        assert_eq!(about_target("/a/b.ply is full", "/a/b.ply"), "The target is full");
+        assert_eq!(about_target("no normals", "/a/b.ply"), "no normals");
     }
 }
