@@ -10,6 +10,7 @@ use normend_render::{CloudUploader, UploadedCloud};
 use crate::job::{Job, JobError, JobStatus};
 use crate::scene_sync::{upload_oriented, upload_points};
 use crate::session::Session;
+use crate::theme;
 
 /// Where a scan comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,6 +21,8 @@ pub enum ScanOrigin {
     Sample,
 }
 
+/// Characters of a file's name that fit on the card.
+const MAX_NAME: usize = 36;
 const SAMPLE: &[u8] = include_bytes!("../../../assets/sample.ply");
 const SAMPLE_NAME: &str = "sample.ply";
 
@@ -160,13 +163,11 @@ impl Work {
     /// What is done, for the card.
     pub fn title(&self) -> String {
         match self {
-            Self::Open { origin, .. } => format!("Opening {}", origin.name()),
+            Self::Open { origin, .. } => format!("Opening {}", theme::elided(&origin.name(), MAX_NAME)),
             Self::Propagate(_) => "Orienting normals".to_owned(),
             Self::Export { path, .. } => {
-                format!(
-                    "Exporting {}",
-                    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy()
-                )
+                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+                format!("Exporting {}", theme::elided(&name, MAX_NAME))
             }
         }
     }

@@ -108,7 +108,9 @@ fn recent_row(ui: &mut Ui, path: &std::path::Path) -> egui::Response {
         .unwrap_or_default();
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = SPACE_M;
-        let response = ui.link(name).on_hover_text(path.display().to_string());
+        let response = ui
+            .link(theme::elided(&name, 40))
+            .on_hover_text(path.display().to_string());
         ui.add(egui::Label::new(RichText::new(folder).weak()).truncate());
         response
     })
