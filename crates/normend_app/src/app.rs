@@ -256,7 +256,9 @@ impl App {
             let undo = document.and_then(Document::next_undo).map(|edit| edit.label());
             let redo = document.and_then(Document::next_redo).map(|edit| edit.label());
             let availability = |command| self.availability(command);
-            if let Some(chosen) = menu_bar::toolbar(ui, &availability, undo, redo, self.tool) {
+            // Without a scan there is nothing for a tool to do.
+            let tool = self.session.as_ref().map(|_| self.tool);
+            if let Some(chosen) = menu_bar::toolbar(ui, &availability, undo, redo, tool) {
                 action = Some(chosen);
             }
         });

@@ -81,7 +81,7 @@ pub fn toolbar(
     availability: &Availability<'_>,
     undo: Option<&str>,
     redo: Option<&str>,
-    tool: Tool,
+    tool: Option<Tool>,
 ) -> Option<Action> {
     let mut action = None;
     ui.horizontal(|ui| {
@@ -113,8 +113,10 @@ pub fn toolbar(
                 action = Some(command.into());
             }
         }
-        divider(ui);
-        ui.add(egui::Label::new(RichText::new(tool.hint()).weak()).truncate());
+        if let Some(tool) = tool {
+            divider(ui);
+            ui.add(egui::Label::new(RichText::new(tool.hint()).weak()).truncate());
+        }
     });
     action
 }
