@@ -415,15 +415,33 @@ fn a_broken_file_gives_words_and_keeps_what_is_open() {
 }
 
 #[test]
-fn the_sample_has_something_to_mend() {
+fn the_sample_is_mended_undone_and_exported() {
     let Some(mut editor) = start(|_| None) else { return };
     editor.click_button("Try the sample");
     editor.wait_until_oriented();
-    assert!(editor.app().document().unwrap().cloud().n_points() >= 50_000);
+    let n_points = editor.app().document().unwrap().cloud().n_points();
+    assert!(n_points >= 50_000);
+    let (bits, normals, plain) = (editor.bits(), editor.normals(), editor.picture());
     let (place, n_would_turn) = editor.hover_wrong_patch();
-    assert!(n_would_turn > 0);
+    // The patch, and not the whole part.
+    assert!((1_000..n_points as u64 / 2).contains(&n_would_turn), "{n_would_turn}");
+
     editor.click(place);
     editor.wait("a source", |app| !app.document().unwrap().sources().is_empty());
+    editor.harness.run_steps(2);
+    assert_eq!(n_different(&normals, &editor.normals()), n_would_turn);
+    assert!(editor.picture().count(is_back) < plain.count(is_back) / 2);
+    // The default source is vouched for together with the picked point, and undone with it.
+    assert_eq!(editor.n_sources(), 2);
+    editor.key(Modifiers::COMMAND, Key::Z);
+    assert_eq!((editor.bits(), editor.n_sources()), (bits, 0));
+    editor.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+
+    let target = editor.folder.path().join("sample_oriented.ply");
+    editor.export_to(&target);
+    editor.wait("an exported file", |app| !app.is_busy());
+    let written = normend_io::read(&target, &Silent).unwrap();
+    assert_eq!(written.given_normals.unwrap().as_slice(), editor.normals());
 }
 
 #[test]

@@ -114,27 +114,6 @@ impl CloudSlices<'_> {
 
 const EMPTY_BOX: (Vec3, Vec3) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
 
-/// The layout of a chunk's bind group.
-pub fn chunk_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::VERTEX,
-        ty: wgpu::BindingType::Buffer {
-            ty,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
-        count: None,
-    };
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("chunk"),
-        entries: &[
-            entry(0, wgpu::BufferBindingType::Uniform),
-            entry(1, wgpu::BufferBindingType::Storage { read_only: true }),
-        ],
-    })
-}
-
 impl CloudBuffers {
     /// Uploads a cloud in chunks of at most `max_chunk_points`; all signs are 0. Returns the bytes uploaded too.
     ///

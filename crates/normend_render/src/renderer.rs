@@ -9,7 +9,7 @@ use egui_wgpu::wgpu;
 use glam::{Mat4, UVec2, Vec2, Vec3};
 
 use crate::camera::BoundingSphere;
-use crate::cloud_buffers::{self, CloudBuffers, CloudSlices, MAX_CHUNK_POINTS};
+use crate::cloud_buffers::{CloudBuffers, CloudSlices, MAX_CHUNK_POINTS};
 use crate::gpu_types::{Frame, Look, SphereMark};
 use crate::marks::{GrowingBuffer, highlight_words};
 use crate::pass::shade::ShadePass;
@@ -145,8 +145,9 @@ impl SplatRenderer {
 
     /// [`Self::new`] with chunks of at most `max_chunk_points`.
     pub(crate) fn with_chunks(device: &wgpu::Device, max_chunk_points: usize) -> Self {
-        let chunk_layout = cloud_buffers::chunk_layout(device);
-        let frame_layout = frame_layout(device);
+        let chunk_layout = pass::uniform_and_storage(device, "chunk", wgpu::ShaderStages::VERTEX);
+        // Every pass shares these: frame and spheres.
+        let frame_layout = pass::uniform_and_storage(device, "frame", wgpu::ShaderStages::VERTEX_FRAGMENT);
         let buffer = |label, size: usize, usage| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -457,27 +458,6 @@ fn look(settings: &DrawSettings, n_highlights: u32) -> Look {
         highlight: palette.highlight.into(),
         pad_1: 0,
     }
-}
-
-/// The bind group that every pass shares: frame and spheres.
-fn frame_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
-        ty: wgpu::BindingType::Buffer {
-            ty,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
-        count: None,
-    };
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("frame"),
-        entries: &[
-            entry(0, wgpu::BufferBindingType::Uniform),
-            entry(1, wgpu::BufferBindingType::Storage { read_only: true }),
-        ],
-    })
 }
 
 /// Rows of a texture from the top, without padding. Blocks; `None` when the device is lost.
