@@ -27,6 +27,8 @@ pub mod orientation;
 
 pub mod regions;
 
+pub mod evidence;
+
 pub mod propagation;
 
 pub mod document;

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 /// A symmetric 3×3 matrix by its upper triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Symmetric3 {
+pub(crate) struct Symmetric3 {
     pub xx: f64,
     pub xy: f64,
     pub xz: f64,
@@ -17,7 +17,7 @@ pub(super) struct Symmetric3 {
 
 /// Eigenvalues in ascending order with their eigenvectors.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Eigen {
+pub(crate) struct Eigen {
     pub values: [f64; 3],
     /// Orthonormal and right- or left-handed.
     pub vectors: [DVec3; 3],

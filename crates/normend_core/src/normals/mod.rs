@@ -3,7 +3,7 @@
 //! Neighborhoods without a plane still get a unit normal: one perpendicular to the line of collinear points, +z for
 //! points in one place.
 
-mod eigen;
+pub(crate) mod eigen;
 mod obne;
 mod pca;
 mod wpca;

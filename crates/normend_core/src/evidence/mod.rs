@@ -1,0 +1,109 @@
+//! What is known of the side that each normal should point to, and how sure that is.
+//!
+//! An [`Evidence`] has a vote for each point: its normal points to the side that was seen, or away from it. Votes come from
+//! views from outside ([`outside_views`]), from the places of the scanner ([`scanner`]) or from normals that came with the
+//! file ([`given`]). All are of one kind, so that they add up and whoever weighs them need not know where they are from.
+//!
+//! Invariant: votes are whole numbers of 1/[`UNIT`], so no sum of them depends on the order of points or threads.
+
+mod depth_buffer;
+mod frame;
+mod outside_views;
+
+pub use outside_views::outside_views;
+
+/// A vote of one: what a single look at a point from straight above weighs. 1/4096 is finer than any weight is known, and
+/// the sum over the points of the largest cloud stays within `i64`.
+pub const UNIT: i32 = 4096;
+
+/// Why a point's side is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Origin {
+    /// Seen from outside of the cloud, where nothing of the cloud is in front of it.
+    OutsideViews,
+    /// Measured by a scanner whose place is known.
+    Scanner,
+    /// A normal that came with the file.
+    Given,
+}
+
+impl Origin {
+    /// All origins, in the order of lists.
+    pub const ALL: [Self; 3] = [Self::OutsideViews, Self::Scanner, Self::Given];
+
+    /// The name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OutsideViews => "outside-views",
+            Self::Scanner => "scanner",
+            Self::Given => "given",
+        }
+    }
+}
+
+/// What is known of the side of one point's normal, in units of 1/[`UNIT`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Vote {
+    /// Weight of the looks at the side that the stored normal points to, minus that of the looks at the other side.
+    pub signed: i32,
+    /// Weight of all looks, at least `|signed|`. Much weight and a small difference mean a sheet that is seen from both sides.
+    pub weight: i32,
+}
+
+impl Vote {
+    /// How much of a full look the point got: `min(weight, 1)`, in 0..=1.
+    pub fn visible(self) -> f32 {
+        self.weight.min(UNIT) as f32 / UNIT as f32
+    }
+
+    /// How far the looks agree that the stored normal points to the seen side: `signed / max(weight, 1)`, in −1..=1.
+    pub fn pull(self) -> f32 {
+        self.signed as f32 / self.weight.max(UNIT) as f32
+    }
+}
+
+/// A vote for each point, and where the votes come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Evidence {
+    votes: Vec<Vote>,
+    origins: Vec<Origin>,
+}
+
+impl Evidence {
+    /// No evidence for any of `n_points`.
+    pub fn none(n_points: usize) -> Self {
+        Self {
+            votes: vec![Vote::default(); n_points],
+            origins: Vec::new(),
+        }
+    }
+
+    /// Takes `n` votes by point that come from `origin`.
+    pub fn new(origin: Origin, votes: Vec<Vote>) -> Self {
+        Self {
+            votes,
+            origins: vec![origin],
+        }
+    }
+
+    /// `n` votes by point.
+    pub fn votes(&self) -> &[Vote] {
+        &self.votes
+    }
+
+    /// Where the votes come from, ascending.
+    pub fn origins(&self) -> &[Origin] {
+        &self.origins
+    }
+
+    /// Adds the votes of `other`, about the same `n` normals.
+    pub fn add(&mut self, other: &Self) {
+        for (vote, other) in self.votes.iter_mut().zip(&other.votes) {
+            vote.signed = vote.signed.saturating_add(other.signed);
+            vote.weight = vote.weight.saturating_add(other.weight);
+        }
+        self.origins.extend(&other.origins);
+        self.origins.sort_unstable();
+        self.origins.dedup();
+    }
+}
