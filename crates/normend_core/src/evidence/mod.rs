@@ -8,9 +8,13 @@
 
 mod depth_buffer;
 mod frame;
+mod given;
 mod outside_views;
+mod scanner;
 
+pub use given::given;
 pub use outside_views::outside_views;
+pub use scanner::{Station, scanner};
 
 /// A vote of one: what a single look at a point from straight above weighs. 1/4096 is finer than any weight is known, and
 /// the sum over the points of the largest cloud stays within `i64`.
@@ -51,6 +55,12 @@ pub struct Vote {
 }
 
 impl Vote {
+    /// Adds one look, or several that agree: positive for the side that the stored normal points to.
+    fn cast(&mut self, signed: i32) {
+        self.signed += signed;
+        self.weight += signed.abs();
+    }
+
     /// How much of a full look the point got: `min(weight, 1)`, in 0..=1.
     pub fn visible(self) -> f32 {
         self.weight.min(UNIT) as f32 / UNIT as f32
