@@ -41,6 +41,12 @@ impl Change {
         self.ranges.iter().map(|range| u64::from(range.end - range.start)).sum()
     }
 
+    /// Whether `position` turned. O(log m) for m ranges.
+    pub fn contains(&self, position: u32) -> bool {
+        let n_begun = self.ranges.partition_point(|range| range.start <= position);
+        n_begun > 0 && position < self.ranges[n_begun - 1].end
+    }
+
     /// Whether nothing turned.
     pub fn is_empty(&self) -> bool {
         self.ranges.is_empty()
@@ -154,6 +160,7 @@ mod tests {
             change.ranges().iter().for_each(|range| actual.flip(range.clone()));
             prop_assert_eq!(&actual, &expect);
             prop_assert_eq!(change.n_points(), expect.bits().count_ones(..) as u64);
+            prop_assert!((0..131).all(|position| change.contains(position) == expect.is_turned(position)));
             prop_assert!(change.ranges().iter().all(|range| range.start < range.end));
             prop_assert!(change.ranges().windows(2).all(|pair| pair[0].end < pair[1].start));
         }

@@ -143,4 +143,21 @@ impl World {
             .map(|(turned, source)| (turned, sources.contains_key(&source).then_some(source)))
             .collect()
     }
+
+    /// The world with the points of a patch turned: as if their stored normals were the opposite ones, in the eyes of
+    /// everything but the sources. Of its tree only the order of positions still holds.
+    pub fn with_turned(&self, patch: &FixedBitSet) -> Self {
+        let mut turned = self.clone();
+        for (a, b, _, disagree) in &mut turned.edges {
+            *disagree ^= patch.contains(*a as usize) != patch.contains(*b as usize);
+        }
+        for position in 0..self.n_points {
+            let point = self.tree.order()[position] as usize;
+            let is_top = self.tree.parent(position as u32).is_none() || self.initial_cuts.contains(position);
+            if is_top && patch.contains(point) {
+                turned.initially_turned.toggle(position);
+            }
+        }
+        turned
+    }
 }

@@ -7,9 +7,13 @@
 //! So a new source cuts one edge, a removed one merges its region over the lightest edge that separates it from another
 //! source's, and a changed sign cuts nothing.
 //!
+//! *Turned patches* change what the edges across their boundaries say, and nothing else: signs travel within a patch
+//! and outside it as before. So each default sign in a patch turns, and so does each sign that a source outside the patch
+//! gives in it; no source is needed to hold the patch, and none turns anything when it is turned.
+//!
 //! Invariants: a region is known by its top, the position whose parent edge is cut, or a root; it is the top's subtree
 //! without the subtrees of the tops in it; it holds at most one source, and where its base region has a source, exactly one. The
-//! bits of a region agree with phi, so one bit tells all of them. Initial cuts are never merged over.
+//! bits of a region agree with the default signs or are their opposites, so one bit tells all of them. Initial cuts are never merged over.
 //! Equal weights are ordered by point id, so the regions depend on the set of sources alone, not on its history.
 //!
 //! Not here: directions of sources and undo, see [`crate::document`].
@@ -41,8 +45,8 @@ pub struct Regions {
     tree: Arc<SpanningTree>,
     /// Roots and initial cuts.
     initial_tops: FixedBitSet,
-    /// The signs without any source.
-    initial_orientation: Orientation,
+    /// The signs without any source. Along the edges within a base region they turn as phi does, but for turned patches.
+    default_orientation: Orientation,
     /// The tops of all regions: [`Self::initial_tops`] and the cuts between sources.
     tops: PositionSet,
     /// The position of the source of each region that has one, by the region's top.
@@ -87,7 +91,7 @@ impl Regions {
         Self {
             tree,
             initial_tops,
-            initial_orientation: Orientation::new(turned.clone()),
+            default_orientation: Orientation::new(turned.clone()),
             tops,
             source_by_top: BTreeMap::new(),
             orientation: Orientation::new(turned),
@@ -132,6 +136,12 @@ impl Regions {
     ///
     /// Regions flip once, in the end, so a batch costs little more than finding its cuts.
     pub fn set(&mut self, sources: impl IntoIterator<Item = (u32, Option<bool>)>) -> Change {
+        self.set_and_turn(sources, &Change::default())
+    }
+
+    /// [`Self::set`], together with turning patches, or turning them back: the default signs of all positions in `patches`
+    /// turn, and so do the signs that sources give, but those of the sources themselves. The order of turns does not matter.
+    pub fn set_and_turn(&mut self, sources: impl IntoIterator<Item = (u32, Option<bool>)>, patches: &Change) -> Change {
         let mut flips = Vec::new();
         let mut wanted = BTreeMap::new();
         for (point, turned) in sources {
@@ -147,6 +157,21 @@ impl Regions {
                 }
             }
         }
+        if !patches.is_empty() {
+            for (&top, &source) in self
+                .source_by_top
+                .iter()
+                .filter(|(_, source)| patches.contains(**source))
+            {
+                let turned = self.orientation.is_turned(source);
+                wanted.entry(source).or_insert((turned, top));
+            }
+        }
+        for range in patches.ranges() {
+            self.default_orientation.flip(range.clone());
+            self.orientation.flip(range.clone());
+        }
+        flips.extend_from_slice(patches.ranges());
         for (position, (turned, top)) in wanted {
             if self.orientation.is_turned(position) != turned {
                 // A later cut or merge may have given the source another top.
@@ -158,9 +183,9 @@ impl Regions {
         Change::from_flips(&flips)
     }
 
-    /// Whether the stored normal of `point` is turned when there is no source: by the default sign of its base region. O(1).
+    /// Whether the stored normal of `point` is turned when there is no source: by its default sign. O(1).
     pub fn starts_turned(&self, point: u32) -> bool {
-        self.initial_orientation.is_turned(self.tree.position(point))
+        self.default_orientation.is_turned(self.tree.position(point))
     }
 
     /// Whether `a` and `b` are in one region.
@@ -269,13 +294,12 @@ impl Regions {
             .min_by(|&a, &b| self.tree.compare_edges(a, b));
         // A cut between sources is no root, so it has a parent.
         let Some((cut, parent)) = lightest.and_then(|cut| Some((cut, self.tree.parent(cut)?))) else {
-            if self.orientation.is_turned(top) != self.initial_orientation.is_turned(top) {
+            if self.is_opposite(top) {
                 self.flip(top, flips);
             }
             return;
         };
-        let turns = self.tree.phi(cut) != self.tree.phi(parent);
-        if (self.orientation.is_turned(cut) != self.orientation.is_turned(parent)) != turns {
+        if self.is_opposite(cut) != self.is_opposite(parent) {
             self.flip(top, flips);
         }
         self.tops.remove(cut);
@@ -284,6 +308,11 @@ impl Regions {
         {
             self.source_by_top.insert(top, neighbor);
         }
+    }
+
+    /// Whether the sign at `position` is not the default one.
+    fn is_opposite(&self, position: u32) -> bool {
+        self.orientation.is_turned(position) != self.default_orientation.is_turned(position)
     }
 
     /// Flips the region of `top` and remembers its ranges.

@@ -51,8 +51,69 @@ fn worlds_and_batches() -> impl Strategy<Value = (World, Vec<Batch>)> {
     })
 }
 
+/// A patch of any points as positions.
+fn positions_of(patch: &FixedBitSet, tree: &SpanningTree) -> Change {
+    let positions: Vec<_> = patch
+        .ones()
+        .map(|point| tree.position(point as u32))
+        .map(|position| position..position + 1)
+        .collect();
+    Change::from_flips(&positions)
+}
+
+/// A world, and edits of its sources that each come with a patch to turn.
+fn worlds_and_turns() -> impl Strategy<Value = (World, Vec<(Batch, FixedBitSet)>)> {
+    worlds_and_batches().prop_flat_map(|(world, batches)| {
+        let n_points = world.n_points;
+        let patch = prop_oneof![
+            1 => Just(vec![false; n_points]),
+            2 => prop::collection::vec(any::<bool>(), n_points),
+        ];
+        let patch = patch.prop_map(|bits| {
+            bits.iter()
+                .enumerate()
+                .filter(|(_, bit)| **bit)
+                .map(|(i, _)| i)
+                .collect()
+        });
+        let patches: Vec<_> = batches.iter().map(|_| patch.clone()).collect();
+        let turns = patches.prop_map(move |patches| batches.iter().cloned().zip(patches).collect());
+        (Just(world), turns)
+    })
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
+
+    #[test]
+    fn turned_patches_change_what_edges_say_and_nothing_else((world, turns) in worlds_and_turns()) {
+        let mut regions = regions_of(&world);
+        let mut sources = BTreeMap::new();
+        let mut turned = FixedBitSet::with_capacity(world.n_points);
+        for (batch, patch) in turns {
+            let before = regions.orientation().clone();
+            let change = regions.set_and_turn(batch.iter().copied(), &positions_of(&patch, &world.tree));
+            prop_assert_eq!(change, difference(&before, regions.orientation()));
+            for (point, turned) in batch {
+                match turned {
+                    Some(turned) => sources.insert(point, turned),
+                    None => sources.remove(&point),
+                };
+            }
+            turned.symmetric_difference_with(&patch);
+            let expect = world.with_turned(&turned).expect(&sources);
+            prop_assert_eq!(&say(&regions), &expect);
+
+            let mut at_once = regions_of(&world);
+            let all = sources.iter().map(|(&point, &turned)| (point, Some(turned)));
+            at_once.set_and_turn(all, &positions_of(&turned, &world.tree));
+            prop_assert_eq!(&say(&at_once), &expect);
+        }
+        // All taken back, nothing is left of it.
+        let all: Vec<_> = sources.keys().map(|&point| (point, None)).collect();
+        regions.set_and_turn(all, &positions_of(&turned, &world.tree));
+        prop_assert_eq!(say(&regions), say(&regions_of(&world)));
+    }
 
     #[test]
     fn batches_are_the_same_as_one_by_one_as_at_once_and_as_algorithm_1((world, batches) in worlds_and_batches()) {
