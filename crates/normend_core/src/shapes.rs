@@ -3,7 +3,12 @@
 //! All are deterministic. Points are spread evenly (Fibonacci lattices and the R2 sequence of Martin Roberts), as a
 //! scanner's are and unlike random ones, which leave holes; noise is added on top with [`Shape::with_noise`].
 
+mod benchmark;
+mod bodies;
+mod field;
 mod random;
+mod rays;
+mod scanner;
 mod solid;
 
 use std::f32::consts::TAU;
@@ -12,7 +17,9 @@ use std::f64;
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
+pub use self::benchmark::{BenchmarkCloud, BenchmarkPoints, benchmark_clouds};
 use self::random::Random;
+pub use self::scanner::Station;
 use self::solid::{Cavity, Primitive, Solid};
 
 /// A generated cloud: `n` positions and their exact outward unit normals.
