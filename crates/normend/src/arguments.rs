@@ -1,5 +1,7 @@
 //! What can be typed: the one table of commands and flags, which gives the parser and the help.
 
+pub mod bench;
+
 use std::fmt;
 use std::path::PathBuf;
 
@@ -10,6 +12,7 @@ use normend_core::shapes::ShapeKind;
 use normend_core::{EdgeRule, Estimator, Parameters, Start};
 use normend_render::{DisplayMode, StandardView};
 
+use self::bench::BenchArguments;
 use crate::commands::render::{PaletteName, PictureSize};
 
 /// Most neighbors that can be asked for: each costs 4 bytes a point, and no surface is flat over a thousand points.
@@ -87,6 +90,8 @@ pub enum Command {
     Render(RenderArguments),
     /// Write a generated scan whose normals are known
     Generate(GenerateArguments),
+    /// Measure the methods on clouds whose normals are known
+    Bench(BenchArguments),
 }
 
 impl Command {
@@ -97,6 +102,7 @@ impl Command {
             Self::Check(_) => "check",
             Self::Render(_) => "render",
             Self::Generate(_) => "generate",
+            Self::Bench(_) => "bench",
         }
     }
 }

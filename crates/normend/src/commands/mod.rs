@@ -1,5 +1,6 @@
 //! What each command means.
 
+pub mod bench;
 pub mod check;
 pub mod generate;
 pub mod orient;
