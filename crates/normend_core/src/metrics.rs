@@ -28,8 +28,8 @@ pub struct Comparison {
     pub wrong: FixedBitSet,
 }
 
-/// Neighbors of each point in the graph whose components may be flipped.
-const K: usize = 10;
+/// Neighbors of each point in the graph whose components may be flipped, and in which wrong regions are connected.
+pub const K: usize = 10;
 
 /// Vectors shorter than this are no reference.
 const SHORTEST_REFERENCE: f64 = 1e-6;
@@ -93,6 +93,47 @@ pub fn compare(
         comparison.mean_unsigned_angle = angles / n_angles as f64;
     }
     Ok(comparison)
+}
+
+/// The connected components of `wrong` points in the symmetric graph of the first [`K`] of `neighbors`: the patches that a
+/// user would see and mend.
+///
+/// Largest first, of equal ones that with the smallest id; ids ascend in each. O(n + K w) for w wrong points.
+pub fn wrong_regions(neighbors: &Neighbors, wrong: &FixedBitSet) -> Vec<Vec<u32>> {
+    // A forest over the wrong points; each root is the smallest id of its tree.
+    let mut parents: Vec<u32> = (0..wrong.len() as u32).collect();
+    for point in wrong.ones() {
+        let row = neighbors.of(point);
+        for &neighbor in &row[..K.min(row.len())] {
+            if wrong.contains(neighbor as usize) {
+                let (a, b) = (root_of(&mut parents, point as u32), root_of(&mut parents, neighbor));
+                parents[a.max(b) as usize] = a.min(b);
+            }
+        }
+    }
+    let mut region_of_root = vec![usize::MAX; wrong.len()];
+    let mut regions: Vec<Vec<u32>> = Vec::new();
+    for point in wrong.ones() {
+        let root = root_of(&mut parents, point as u32) as usize;
+        if root == point {
+            region_of_root[root] = regions.len();
+            regions.push(Vec::new());
+        }
+        regions[region_of_root[root]].push(point as u32);
+    }
+    // Regions were made in the order of their smallest ids, and the sort keeps that of equal ones.
+    regions.sort_by_key(|region| std::cmp::Reverse(region.len()));
+    regions
+}
+
+/// The root of a point's tree; halves the way there for the next time.
+fn root_of(parents: &mut [u32], mut point: u32) -> u32 {
+    while parents[point as usize] != point {
+        let above = parents[parents[point as usize] as usize];
+        parents[point as usize] = above;
+        point = above;
+    }
+    point
 }
 
 /// How the normal of one point compares with its reference.
@@ -206,6 +247,24 @@ mod tests {
             ),
             (60, 60, 60)
         );
+    }
+
+    #[test]
+    fn wrong_regions_are_connected_through_wrong_points_only() {
+        let (cloud, _) = two_lines();
+        let neighbors = Neighbors::find(&cloud, K, &Silent).unwrap();
+        let check = |wrong: &[u32], expect: &[&[u32]]| {
+            let wrong: FixedBitSet = wrong.iter().map(|&point| point as usize).collect();
+            let mut all = FixedBitSet::with_capacity(60);
+            all.union_with(&wrong);
+            assert_eq!(wrong_regions(&neighbors, &all), expect);
+        };
+        check(&[], &[]);
+        // Points in the middle of a line are neighbors up to 5 apart; the lines are not connected.
+        check(&[8, 12, 20, 45], &[&[8, 12], &[20], &[45]]);
+        check(&[8, 14, 40, 41, 42], &[&[40, 41, 42], &[8], &[14]]);
+        // The end of a line has the next 10 as neighbors; the other direction counts as well.
+        check(&[0, 10, 3, 33], &[&[0, 3, 10], &[33]]);
     }
 
     #[test]

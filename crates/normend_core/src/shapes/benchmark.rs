@@ -352,6 +352,7 @@ mod tests {
     #[test]
     fn bodies_are_closed_inside_their_ball() {
         let mut random = Random::new(5);
+        let mut open = Vec::new();
         for cloud in benchmark_clouds() {
             let body = (cloud.body)();
             if body.window.is_some() || cloud.name.starts_with("room") {
@@ -359,28 +360,36 @@ mod tests {
             }
             for _ in 0..1000 {
                 let place = body.radius * random.direction();
-                assert!((body.field)(place) > 0.0, "{} reaches {place}", cloud.name);
+                if (body.field)(place) <= 0.0 {
+                    open.push(cloud.name);
+                    break;
+                }
             }
         }
+        assert!(open.is_empty(), "reach out of their balls: {open:?}");
     }
 
-    /// The rays step by the function's value, so it must not grow faster than distance.
+    /// The rays step by the function's value, so it must not be larger than the distance to the surface.
     #[test]
-    fn fields_are_not_steeper_than_distance() {
+    fn values_are_not_larger_than_the_distance_to_the_surface() {
         let mut random = Random::new(6);
+        let mut too_large = Vec::new();
         for cloud in benchmark_clouds() {
             let body = (cloud.body)();
-            for _ in 0..3000 {
-                let a = body.radius * random.unit() * random.direction();
-                let step = body.radius * 0.1 * random.unit().powi(3);
-                let change = (body.field)(a) - (body.field)(a + step * random.direction());
-                assert!(
-                    change.abs() <= 1.001 * step,
-                    "{} at {a}: {change} in {step}",
-                    cloud.name
-                );
+            let mut worst: f64 = 0.0;
+            for (point, _) in cloud.sample(&body, 400) {
+                for _ in 0..10 {
+                    let step = body.radius * (1e-4 + random.unit().powi(3));
+                    let value = (body.field)(point + step * random.direction());
+                    worst = worst.max(value.abs() / step);
+                }
+            }
+            // A little for rounding.
+            if worst > 1.0 + 1e-6 {
+                too_large.push((cloud.name, worst));
             }
         }
+        assert!(too_large.is_empty(), "value / distance: {too_large:?}");
     }
 
     #[test]

@@ -335,7 +335,7 @@ pub(super) fn chain(links: usize) -> Body {
         let ring = turned(torus(0.27, 0.06), X, FRAC_PI_2 * (i % 2) as f64 + 0.3);
         moved(ring, (i as f64 - 0.5 * (links - 1) as f64) * 0.36 * X)
     };
-    Body::closed(union_of((0..links).map(link).collect()), 1.25)
+    Body::closed(union_of((0..links).map(link).collect()), 0.18 * links as f64 + 0.2)
 }
 
 /// Three rings, each through both others.

@@ -1,10 +1,10 @@
 //! Solids as functions of space: negative inside, positive outside, zero on the surface.
 //!
-//! No function changes faster than distance does (Lipschitz constant 1, up to rounding). So its value is a step that cannot
-//! pass through a surface, which is what lets rays find thin sheets; see [`super::rays`]. `min`, `max`, turns and shifts
-//! keep this, and a function that is steeper is divided by its bound.
+//! No value is larger than the distance to the surface. So it is a step that cannot pass through one, which is what lets rays
+//! find thin sheets; see [`super::rays`]. Functions of slope 1 have this, `min`, `max`, turns and shifts keep it, and a
+//! function that is steeper is divided by its bound.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
 use glam::{DQuat, DVec2, DVec3};
@@ -215,6 +215,9 @@ impl Blades {
         let spaces = if whole { self.count } else { self.count - 1 };
         let step = self.fan / spaces as f64;
         let last = spaces as f64;
+        // The slope of reach · sin(off) has (sin - reach · sweep · cos, cos, reach · twist · cos) along radius, angle and z.
+        let (by_twist, by_sweep) = (self.outer * self.twist, self.outer * self.sweep);
+        let slope = (1.0 + by_sweep + by_sweep * by_sweep + by_twist * by_twist).sqrt();
         solid(move |p| {
             let radius = p.x.hypot(p.y);
             let angle = p.y.atan2(p.x) - self.twist * p.z - self.sweep * radius;
@@ -228,9 +231,14 @@ impl Blades {
             };
             let off = angle - step * turns;
             let off = off - TAU * (off / TAU).round();
-            let slope = 1.0_f64.hypot(self.outer * self.twist).hypot(self.outer * self.sweep);
-            // Half the angle: its sine grows up to the opposite side, so there is no second blade there.
-            let across = (2.0 * radius * (0.5 * off).sin().abs()) / slope - 0.5 * self.thickness;
+            // The distance to the half plane of the blade; beyond its end it need not grow with the radius.
+            let reach = radius.min(self.outer);
+            let to_plane = if off.abs() < FRAC_PI_2 {
+                reach * off.abs().sin()
+            } else {
+                reach
+            };
+            let across = to_plane / slope - 0.5 * self.thickness;
             across
                 .max(radius - self.outer)
                 .max(self.inner - radius)
@@ -241,40 +249,45 @@ impl Blades {
 
 /// A sheet rolled up along z: radius `start + pitch · turns`.
 pub(super) fn spiral(start: f64, pitch: f64, turns: f64, thickness: f64, height: f64) -> Field {
-    let growth = pitch / TAU;
-    let slope = 1.0_f64.hypot(growth / start);
+    let (growth, inner) = (pitch / TAU, start - thickness);
+    // The distance along the radius is longer than the shortest, most of all at the begin.
+    let slope = 1.0_f64.hypot(growth / inner);
+    let edges = [0.0, TAU * turns].map(|angle| (start + growth * angle) * DVec2::from_angle(angle));
     solid(move |p| {
         let (radius, angle) = (p.x.hypot(p.y), p.y.atan2(p.x).rem_euclid(TAU));
-        let lap = ((radius - start - growth * angle) / pitch).round();
-        let distance = [lap - 1.0, lap, lap + 1.0]
-            .into_iter()
-            .map(|lap| {
-                let angle_here = angle + TAU * lap;
-                let end = angle_here.clamp(0.0, TAU * turns);
-                let on_sheet = (start + growth * end) * DVec2::from_angle(end);
-                if end == angle_here {
-                    (radius - start - growth * angle_here).abs()
-                } else {
-                    on_sheet.distance(p.truncate())
-                }
-            })
-            .fold(f64::INFINITY, f64::min);
-        (distance / slope - 0.5 * thickness).max(p.z.abs() - 0.5 * height)
+        let last_lap = (turns - angle / TAU).floor();
+        let lap = ((radius - start - growth * angle) / pitch).round().clamp(0.0, last_lap);
+        let along_radius = (radius - start - growth * (angle + TAU * lap)).abs();
+        let to_edges = edges.map(|edge| edge.distance(p.truncate()));
+        let distance = along_radius.min(to_edges[0]).min(to_edges[1]);
+        let sheet = distance / slope - 0.5 * thickness;
+        around_axis(sheet, radius, inner).max(p.z.abs() - 0.5 * height)
     })
 }
 
 /// A tube along a (p, q) torus knot around z: `p` turns around the axis, `q` around the ring.
 pub(super) fn knot(p: usize, q: usize, ring: f64, coil: f64, tube: f64) -> Field {
     let (p_turns, q_turns) = (p as f64, q as f64);
-    let slope = 1.0_f64.hypot(coil * q_turns / (p_turns * (ring - coil - tube)));
+    let inner = ring - coil - tube;
+    let slope = 1.0_f64.hypot(coil * q_turns / (p_turns * inner));
     solid(move |point| {
-        let angle = point.y.atan2(point.x);
-        let here = DVec2::new(point.x.hypot(point.y) - ring, point.z);
+        let (radius, angle) = (point.x.hypot(point.y), point.y.atan2(point.x));
+        let here = DVec2::new(radius - ring, point.z);
         let distance = (0..p)
             .map(|strand| here.distance(coil * DVec2::from_angle((angle + TAU * strand as f64) * q_turns / p_turns)))
             .fold(f64::INFINITY, f64::min);
-        (distance - tube) / slope
+        around_axis((distance - tube) / slope, radius, inner)
     })
+}
+
+/// The value near the axis, where functions of the angle are steep: no more than the distance to the `inner` radius, within
+/// which there is no surface.
+fn around_axis(value: f64, radius: f64, inner: f64) -> f64 {
+    if radius < inner {
+        value.min(inner - radius)
+    } else {
+        value
+    }
 }
 
 /// The wall of `thickness` about the gyroid (A. Schoen) with `cells` per length.
