@@ -9,7 +9,8 @@ use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use normend_core::shapes::ShapeKind;
-use normend_core::{EdgeRule, Estimator, Parameters, Start};
+use normend_core::propagation::{ETA, VIEWS};
+use normend_core::{EdgeRule, Estimator, Parameters, Preset, SourceRule, Start};
 use normend_render::{DisplayMode, StandardView};
 
 use self::bench::BenchArguments;
@@ -119,38 +120,58 @@ pub struct CommonArguments {
     pub quiet: bool,
 }
 
-/// How signs are found.
+/// How signs are found: a preset, and what is typed in place of its parameters.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct PropagationArguments {
+    /// A whole method; the flags below replace parts of it
+    #[arg(long, value_name = "NAME", value_parser = one_of(&Preset::ALL, Preset::name), default_value = Preset::default().name())]
+    pub preset: Preset,
+
     /// How normals are fitted to neighborhoods
-    #[arg(long, value_name = "NAME", value_parser = one_of(&Estimator::ALL, Estimator::name), default_value = Estimator::default().name())]
-    pub estimator: Estimator,
+    #[arg(long, value_name = "NAME", value_parser = one_of(&Estimator::ALL, Estimator::name))]
+    pub estimator: Option<Estimator>,
 
     /// Neighbors that a normal is fitted to
-    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(3..=MAX_K), default_value_t = Parameters::default().k_normals)]
-    pub k_normals: usize,
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(3..=MAX_K))]
+    pub k_normals: Option<usize>,
 
     /// Neighbors of each point in the graph that signs travel along
-    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=MAX_K), default_value_t = Parameters::default().k_graph)]
-    pub k_graph: usize,
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=MAX_K))]
+    pub k_graph: Option<usize>,
 
     /// How the normals of neighbors are compared
-    #[arg(long, value_name = "NAME", value_parser = one_of(&EdgeRule::ALL, EdgeRule::name), default_value = EdgeRule::default().name())]
-    pub edge_rule: EdgeRule,
+    #[arg(long, value_name = "NAME", value_parser = one_of(&EdgeRule::ALL, EdgeRule::name))]
+    pub edge_rule: Option<EdgeRule>,
 
     /// Estimate normals, or keep those of the file with their signs
-    #[arg(long, value_name = "NAME", value_parser = one_of(&Start::ALL, Start::name), default_value = Start::default().name())]
-    pub start: Start,
+    #[arg(long, value_name = "NAME", value_parser = one_of(&Start::ALL, Start::name))]
+    pub start: Option<Start>,
+
+    /// Who vouches for the first signs
+    #[arg(long, value_name = "NAME", value_parser = one_of(&SourceRule::ALL, SourceRule::name))]
+    pub sources: Option<SourceRule>,
+
+    /// Viewpoints that vote for sources: 8 are the corners of the bounding box, 14 its faces too, 26 its edges too
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(*VIEWS.start() as u64..=*VIEWS.end() as u64))]
+    pub views: Option<usize>,
+
+    /// How far from the ends of the votes sources are taken: in votes, or as a share for mended ones
+    #[arg(long, value_name = "X", value_parser = eta)]
+    pub eta: Option<f32>,
 }
 
 impl From<PropagationArguments> for Parameters {
     fn from(typed: PropagationArguments) -> Self {
+        let preset = typed.preset.parameters();
         Self {
-            estimator: typed.estimator,
-            k_normals: typed.k_normals,
-            k_graph: typed.k_graph,
-            edge_rule: typed.edge_rule,
-            start: typed.start,
+            estimator: typed.estimator.unwrap_or(preset.estimator),
+            k_normals: typed.k_normals.unwrap_or(preset.k_normals),
+            k_graph: typed.k_graph.unwrap_or(preset.k_graph),
+            edge_rule: typed.edge_rule.unwrap_or(preset.edge_rule),
+            start: typed.start.unwrap_or(preset.start),
+            sources: typed.sources.unwrap_or(preset.sources),
+            views: typed.views.unwrap_or(preset.views),
+            eta: typed.eta.unwrap_or(preset.eta),
         }
     }
 }
@@ -166,8 +187,8 @@ The output's extension says its format; without one, or with the input's, it is 
 .asc .pts .csv) or back go positions and normals only.
 
 The report (--json) has a line for each input: an object with input, output, points, left_out (rows without finite \
-coordinates), components, sources (places where signs start), parameters, seconds (read, neighbors, normals, graph, \
-tree, signs, write, total) and peak_rss_bytes (of the program so far; null where the system does not tell). A failed \
+coordinates), components, sources (places where signs start), voted_sources (those found by visibility), parameters, \
+seconds (read, neighbors, normals, sources where voted, graph, tree, signs, write, total) and peak_rss_bytes (of the program so far; null where the system does not tell). A failed \
 input has input and error.
 
 Examples:
@@ -330,6 +351,14 @@ fn noise(typed: &str) -> Result<f32, String> {
         .ok_or_else(|| "type a number from 0 to 1".to_owned())
 }
 
+/// Parses how far from the ends of the votes sources are taken.
+fn eta(typed: &str) -> Result<f32, String> {
+    let parsed: Option<f32> = typed.parse().ok();
+    parsed
+        .filter(|eta| ETA.contains(eta))
+        .ok_or_else(|| format!("type a number from {} to {}", ETA.start(), ETA.end()))
+}
+
 /// Parses one of `all` by its name, so that the lists of the crates are the only ones.
 fn one_of<T>(all: &'static [T], name: fn(T) -> &'static str) -> impl TypedValueParser<Value = T>
 where
@@ -401,6 +430,21 @@ mod tests {
     }
 
     #[test]
+    fn a_preset_gives_what_is_not_typed() {
+        for preset in Preset::ALL {
+            let typed = ["normend", "orient", "a.ply", "-o", "b.ply", "--eta", "0.5", "--preset", preset.name()];
+            let Some(Command::Orient(orient)) = Arguments::try_parse_from(typed).unwrap().command else {
+                panic!("not parsed as orient");
+            };
+            let expect = Parameters {
+                eta: 0.5,
+                ..preset.parameters()
+            };
+            assert_eq!(Parameters::from(orient.propagation), expect);
+        }
+    }
+
+    #[test]
     fn wrong_values_are_refused() {
         for wrong in [
             ["--k-normals", "2"],
@@ -409,6 +453,11 @@ mod tests {
             ["--threads", "0"],
             ["--estimator", "ransac"],
             ["--start", ""],
+            ["--preset", "magic"],
+            ["--sources", "all"],
+            ["--views", "27"],
+            ["--eta", "-0.1"],
+            ["--eta", "nan"],
         ] {
             let typed = ["normend", "orient", "a.ply", "-o", "b.ply"].into_iter().chain(wrong);
             assert!(Arguments::try_parse_from(typed).is_err(), "{wrong:?} was accepted");

@@ -134,6 +134,7 @@ fn time_batch(document: &mut Document, random: &mut Random) {
             point: random.below(n_points),
             normal,
             origin: Origin::Picked,
+            patch: None,
         }
     };
     let sources = (0..N_SOURCES).map(source).collect();

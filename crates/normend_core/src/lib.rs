@@ -21,7 +21,11 @@ pub mod riemannian_graph;
 
 pub mod spanning_tree;
 
+pub mod patches;
+
 pub mod sources;
+
+pub mod visibility;
 
 pub mod orientation;
 
@@ -41,9 +45,10 @@ pub use document::{Document, Edit, EditError};
 pub use neighbors::Neighbors;
 pub use normals::Estimator;
 pub use orientation::{Change, Orientation};
+pub use patches::Patches;
 pub use point_cloud::{PointCloud, PointCloudError};
 pub use progress::{Cancelled, Progress, Silent};
-pub use propagation::{Parameters, Propagation, Stage, Start};
+pub use propagation::{Parameters, Preset, Propagation, SourceRule, Stage, Start};
 pub use regions::Regions;
 pub use riemannian_graph::{EdgeRule, RiemannianGraph};
 pub use sources::{Source, Sources};

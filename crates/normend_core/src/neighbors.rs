@@ -83,6 +83,31 @@ impl Neighbors {
     }
 }
 
+/// Point ids along a Morton curve, so that neighbors in space are near in memory; equal positions follow each other, ids
+/// ascending. O(n log n), in parallel.
+pub(crate) fn morton_order(cloud: &PointCloud) -> Vec<u32> {
+    let (min, max) = cloud.bounding_box();
+    let size = max - min;
+    let cells = 2_097_151.0 / f64::from(size.max_element()).max(f64::MIN_POSITIVE);
+    let positions = cloud.positions();
+    let mut sorted: Vec<(u64, u32)> = positions
+        .par_iter()
+        .enumerate()
+        .map(|(id, &position)| {
+            let cell = (position - min).as_dvec3() * cells;
+            (morton(cell.x as u64, cell.y as u64, cell.z as u64), id as u32)
+        })
+        .collect();
+    // Within a cell by coordinates, so that equal positions follow each other.
+    let coordinates = |id: u32| positions[id as usize];
+    sorted.par_sort_unstable_by(|a, b| {
+        a.0.cmp(&b.0)
+            .then_with(|| compare(coordinates(a.1), coordinates(b.1)))
+            .then(a.1.cmp(&b.1))
+    });
+    sorted.into_iter().map(|(_, id)| id).collect()
+}
+
 /// Places that one task handles at a time.
 const PLACES: usize = 1024;
 
@@ -98,27 +123,8 @@ struct Places {
 
 impl Places {
     fn new(cloud: &PointCloud) -> Self {
-        let (min, max) = cloud.bounding_box();
-        let size = max - min;
-        let cells = 2_097_151.0 / f64::from(size.max_element()).max(f64::MIN_POSITIVE);
         let positions = cloud.positions();
-        let mut sorted: Vec<(u64, u32)> = positions
-            .par_iter()
-            .enumerate()
-            .map(|(id, &position)| {
-                let cell = (position - min).as_dvec3() * cells;
-                (morton(cell.x as u64, cell.y as u64, cell.z as u64), id as u32)
-            })
-            .collect();
-        // Within a cell by coordinates, so that equal positions follow each other.
-        let coordinates = |id: u32| positions[id as usize];
-        sorted.par_sort_unstable_by(|a, b| {
-            a.0.cmp(&b.0)
-                .then_with(|| compare(coordinates(a.1), coordinates(b.1)))
-                .then(a.1.cmp(&b.1))
-        });
-        let ids: Vec<u32> = sorted.into_iter().map(|(_, id)| id).collect();
-
+        let ids = morton_order(cloud);
         let scale = power_of_two_near(cloud.diagonal()).recip();
         let mut places = Self {
             positions: Vec::with_capacity(ids.len()),
@@ -127,7 +133,7 @@ impl Places {
         };
         let mut previous = Vec3::NAN;
         for (start, &id) in ids.iter().enumerate() {
-            let position = coordinates(id);
+            let position = positions[id as usize];
             if position != previous {
                 places.starts.push(start as u32);
                 places.positions.push((position * scale).to_array());

@@ -27,7 +27,7 @@ pub struct Level<'a> {
 }
 
 /// One of the nested sets of points around a point. Patches of one [`Patches`] are equal when their points are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Patch {
     node: u32,
     /// First of its leaves.

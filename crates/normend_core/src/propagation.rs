@@ -1,6 +1,8 @@
 //! From cloud and parameters to the tree that signs travel along: everything slow, once, in a job.
 
 mod given;
+mod preset;
+mod source_rule;
 mod splat_radii;
 
 use std::ops::RangeInclusive;
@@ -11,9 +13,12 @@ use fixedbitset::FixedBitSet;
 use glam::Vec3;
 
 use self::given::GivenNormals;
+pub use self::preset::Preset;
+pub use self::source_rule::{ETA, SourceRule, VIEWS};
 use crate::progress::Part;
 use crate::{
-    Cancelled, EdgeRule, Estimator, Neighbors, PointCloud, Progress, Regions, RiemannianGraph, SpanningTree, normals,
+    Cancelled, EdgeRule, Estimator, Neighbors, Patches, PointCloud, Progress, Regions, RiemannianGraph, Source,
+    SpanningTree, normals, visibility,
 };
 
 /// Which normals and signs a document starts from.
@@ -48,7 +53,7 @@ impl Start {
 }
 
 /// What a user can set about the propagation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
     /// How normals are fitted.
     pub estimator: Estimator,
@@ -60,6 +65,12 @@ pub struct Parameters {
     pub edge_rule: EdgeRule,
     /// Estimated or given normals.
     pub start: Start,
+    /// Who vouches for the first signs; without effect where signs start as given.
+    pub sources: SourceRule,
+    /// Viewpoints that vote for sources, within [`VIEWS`].
+    pub views: usize,
+    /// How far from the ends of the votes sources are taken (Liu et al. §3.4), within [`ETA`].
+    pub eta: f32,
 }
 
 impl Parameters {
@@ -70,17 +81,25 @@ impl Parameters {
     pub const K_GRAPH: RangeInclusive<usize> = 1..=200;
 }
 
-impl Default for Parameters {
+impl Parameters {
     /// OBNE over 12 neighbors, graph of 6. With larger neighborhoods the graph links the two sides of thin walls, where the
-    /// dot product goes wrong; with smaller ones noise does.
+    /// dot product goes wrong; with smaller ones noise does. Views and eta are the paper's.
+    pub(crate) const TREE: Self = Self {
+        estimator: Estimator::Obne,
+        k_normals: 12,
+        k_graph: 6,
+        edge_rule: EdgeRule::Dot,
+        start: Start::Estimate,
+        sources: SourceRule::Highest,
+        views: 8,
+        eta: 0.07,
+    };
+}
+
+impl Default for Parameters {
+    /// Those of the default [`Preset`].
     fn default() -> Self {
-        Self {
-            estimator: Estimator::Obne,
-            k_normals: 12,
-            k_graph: 6,
-            edge_rule: EdgeRule::Dot,
-            start: Start::Estimate,
-        }
+        Preset::default().parameters()
     }
 }
 
@@ -91,6 +110,8 @@ pub enum Stage {
     Neighbors,
     /// Normals of any sign.
     Normals,
+    /// Votes for sources, where the source rule asks for them.
+    Sources,
     /// Riemannian graph.
     Graph,
     /// Minimum spanning tree in preorder.
@@ -98,11 +119,12 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// The name in reports: `neighbors`, `normals`, `graph`, `tree`.
+    /// The name in reports: `neighbors`, `normals`, `sources`, `graph`, `tree`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Neighbors => "neighbors",
             Self::Normals => "normals",
+            Self::Sources => "sources",
             Self::Graph => "graph",
             Self::Tree => "tree",
         }
@@ -126,6 +148,11 @@ pub struct Propagation {
     /// The point of each component's default source, in the order of the tree's roots: the one farthest along +z. Empty
     /// where signs start as given: there each region has the signs that came with it.
     pub default_sources: Vec<u32>,
+    /// The sources that the source rule found, ascending by point; the base regions have them already. A source of the document at
+    /// the same point holds instead of one of these.
+    pub voted_sources: Arc<Vec<Source>>,
+    /// The patches that a click can turn; `None` where the tree comes from no agglomeration.
+    pub patches: Option<Arc<Patches>>,
     /// Wall seconds of each stage.
     pub seconds: Vec<(Stage, f64)>,
 }
@@ -159,7 +186,7 @@ impl Propagation {
         clock.finish(Stage::Neighbors);
 
         progress.stage("Estimating normals");
-        let part = Part::new(progress, 0.35..0.75);
+        let part = Part::new(progress, 0.35..0.6);
         let estimate = || normals::estimate(cloud, &neighbors, k_normals, parameters.estimator, &part);
         let normals = match &given {
             Some(given) if given.missing.is_clear() => given.normals.clone(),
@@ -167,6 +194,19 @@ impl Propagation {
             None => estimate()?,
         };
         clock.finish(Stage::Normals);
+
+        let votes = given.is_none() && parameters.sources != SourceRule::Highest;
+        let voted_sources = if votes {
+            progress.stage("Looking for sources");
+            let part = Part::new(progress, 0.6..0.75);
+            let (rule, views) = (parameters.sources, parameters.views);
+            let votes = visibility::votes(cloud, &neighbors, k_normals, &normals, rule, views, &part)?;
+            let sources = visibility::sources(&votes, &normals, rule, parameters.eta);
+            clock.finish(Stage::Sources);
+            sources
+        } else {
+            Vec::new()
+        };
 
         progress.stage("Building the graph");
         let part = Part::new(progress, 0.75..0.8);
@@ -189,7 +229,11 @@ impl Propagation {
             default_sources.clear();
         }
         let tree = Arc::new(tree);
-        let base_regions = Regions::new(Arc::clone(&tree), initial_cuts, initially_turned);
+        let mut base_regions = Regions::new(Arc::clone(&tree), initial_cuts, initially_turned);
+        base_regions.set(voted_sources.iter().map(|source| {
+            let turned = source.turns(normals[source.point as usize]);
+            (source.point, Some(turned))
+        }));
         clock.finish(Stage::Tree);
 
         Ok(Self {
@@ -199,16 +243,26 @@ impl Propagation {
             tree,
             base_regions,
             default_sources,
+            voted_sources: Arc::new(voted_sources),
+            patches: None,
             seconds: clock.seconds,
         })
     }
 }
 
 impl Propagation {
+    /// The voted source at `point`. O(log n).
+    pub fn voted_source(&self, point: u32) -> Option<Source> {
+        let index = self.voted_sources.binary_search_by_key(&point, |source| source.point);
+        index.ok().map(|index| self.voted_sources[index])
+    }
+
     /// The rule that decides the sides where no source does, in words for files: "as given", "farthest along +z up".
     pub fn rule(&self) -> &'static str {
         if self.default_sources.is_empty() {
             "as given"
+        } else if !self.voted_sources.is_empty() {
+            "visible points outward"
         } else {
             "farthest along +z up"
         }

@@ -12,6 +12,8 @@ pub enum Origin {
     /// A component's default source (its point farthest along +z), vouched for when the user first mended a patch beside
     /// it.
     Default,
+    /// Viewpoints around the cloud that see it (Liu et al. §3.4).
+    Voted,
 }
 
 impl Origin {
@@ -20,6 +22,7 @@ impl Origin {
         match self {
             Self::Picked => "Picked",
             Self::Default => "Default",
+            Self::Voted => "Voted",
         }
     }
 }
@@ -36,6 +39,19 @@ pub struct Source {
     pub normal: Vec3,
     /// Who vouches.
     pub origin: Origin,
+    /// The patch that has the source's side as a whole, as far as no other source says otherwise; `None` for the point alone.
+    pub patch: Option<SourcePatch>,
+}
+
+/// The patch that a source was made to turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SourcePatch {
+    /// Names the patch: the smallest around the source's point of at least so many points. So it is found again among the
+    /// patches of other parameters.
+    pub n_points: u32,
+    /// Whether mends had turned what is around the patch away from the side it starts with; else the patch is turned
+    /// where its source does not vouch for the side it starts with.
+    pub amid_mended: bool,
 }
 
 impl Source {
@@ -53,11 +69,24 @@ impl Source {
         first.is_some_and(|component| component < 0.0)
     }
 
-    /// The same source vouching for the opposite side.
+    /// The same source vouching for the opposite side; its patch turns.
     pub fn opposite(self) -> Self {
         Self {
             normal: -self.normal,
             ..self
+        }
+    }
+
+    /// The same source vouching for the opposite side, as a part of something larger that turns: its patch stays turned or
+    /// not against what is around it.
+    pub fn opposite_amid_opposite(self) -> Self {
+        let patch = self.patch.map(|patch| SourcePatch {
+            amid_mended: !patch.amid_mended,
+            ..patch
+        });
+        Self {
+            patch,
+            ..self.opposite()
         }
     }
 }
@@ -114,6 +143,7 @@ mod tests {
             point: 3,
             normal,
             origin: Origin::Picked,
+            patch: None,
         }
     }
 

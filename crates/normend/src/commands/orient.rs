@@ -51,6 +51,7 @@ struct Oriented {
     left_out: usize,
     components: usize,
     sources: usize,
+    voted_sources: usize,
     #[serde(serialize_with = "serialize_parameters")]
     parameters: Parameters,
     seconds: Seconds,
@@ -76,6 +77,9 @@ fn serialize_parameters<S: Serializer>(parameters: &Parameters, serializer: S) -
         k_graph: usize,
         edge_rule: &'static str,
         start: &'static str,
+        sources: &'static str,
+        views: usize,
+        eta: f32,
     }
     let named = Named {
         estimator: parameters.estimator.name(),
@@ -83,6 +87,9 @@ fn serialize_parameters<S: Serializer>(parameters: &Parameters, serializer: S) -
         k_graph: parameters.k_graph,
         edge_rule: parameters.edge_rule.name(),
         start: parameters.start.name(),
+        sources: parameters.sources.name(),
+        views: parameters.views,
+        eta: parameters.eta,
     };
     named.serialize(serializer)
 }
@@ -242,7 +249,8 @@ fn orient(job: &Job, parameters: Parameters, overwrite: bool, bar: &Bar) -> anyh
         .0
         .extend(propagation.seconds.iter().map(|&(stage, secs)| (stage.name(), secs)));
     let components = propagation.tree.roots().len();
-    let sources = propagation.base_regions.n_base_regions();
+    let sources = propagation.base_regions.n_regions();
+    let voted_sources = propagation.voted_sources.len();
 
     let signs_started = Instant::now();
     let rule = propagation.rule();
@@ -270,6 +278,7 @@ fn orient(job: &Job, parameters: Parameters, overwrite: bool, bar: &Bar) -> anyh
         left_out: scan.n_left_out,
         components,
         sources,
+        voted_sources,
         parameters,
         seconds,
         peak_rss_bytes: peak_rss_bytes(),

@@ -14,17 +14,24 @@ use std::sync::Arc;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::sources::Origin;
+use crate::patches::{Offer, Patch};
+use crate::sources::{Origin, SourcePatch};
 use crate::{Change, Orientation, Parameters, PointCloud, Propagation, Regions, Source, Sources};
 
 mod edit;
 mod history;
+mod turned_patches;
 
+#[cfg(test)]
+mod patch_tests;
+#[cfg(test)]
+mod voted_tests;
 #[cfg(test)]
 mod tests;
 
 pub use edit::{Edit, EditError};
 use history::{History, SourceChange, Step};
+use turned_patches::TurnedPatches;
 
 /// A cloud with its sources, and everything derived from them.
 #[derive(Debug)]
@@ -43,26 +50,80 @@ pub struct Document {
 struct Derived {
     propagation: Propagation,
     regions: Regions,
+    /// `None` without patches.
+    turned: Option<TurnedPatches>,
 }
 
 impl Derived {
     /// Brings the regions in line with the sources at some points.
     fn set(&mut self, sources: impl IntoIterator<Item = (u32, Option<Source>)>) -> Change {
-        let normals = &self.propagation.normals;
-        self.regions.set(
-            sources
-                .into_iter()
-                .map(|(point, source)| (point, source.map(|source| source.turns(normals[point as usize])))),
-        )
+        let sources: Vec<_> = sources.into_iter().collect();
+        let Self {
+            propagation,
+            regions,
+            turned,
+        } = self;
+        let patches = turned.as_mut().map_or_else(Change::default, |turned| {
+            turned.set(
+                sources.iter().copied(),
+                |source| is_flipped(propagation, source),
+                &propagation.tree,
+            )
+        });
+        let turns = |source: Source| source.turns(propagation.normals[source.point as usize]);
+        // Where no source of the document is left, the voted one holds again, turned with the patches around it.
+        let voted = |point: u32| {
+            let is_amid_turned = || turned.as_ref().is_some_and(|turned| turned.turns_at(point));
+            propagation
+                .voted_source(point)
+                .map(|source| turns(source) != is_amid_turned())
+        };
+        let wanted = |&(point, source): &(u32, Option<Source>)| (point, source.map(turns).or_else(|| voted(point)));
+        // What is vouched for stays as it is when a patch around it turns.
+        let held = turned.iter().flat_map(TurnedPatches::sources);
+        let held = held.filter(|source| patches.contains(propagation.tree.position(source.point)));
+        let held = held.map(|source| (source.point, Some(turns(*source))));
+        regions.set_and_turn(sources.iter().map(wanted).chain(held), &patches)
     }
 
-    /// An existing point as the source that a click on it makes.
-    fn mended(&self, point: u32) -> Source {
+    /// An existing point as the source that a click on it makes, in place of the one it may have.
+    fn mended(&self, point: u32, sources: &Sources) -> Source {
+        let patch = sources
+            .get(point)
+            .and_then(|source| source.opposite_amid_opposite().patch);
         Source {
             point,
             normal: -self.oriented_normal(point),
             origin: Origin::Picked,
+            patch,
         }
+    }
+
+    /// The patch that `Edit::TurnPatch` names.
+    fn patch_to_turn(&self, point: u32, n_points: u32) -> Result<(&TurnedPatches, Patch), EditError> {
+        let turned = self.turned.as_ref().ok_or(EditError::NoPatches)?;
+        let patch = turned.patches().find(point, n_points);
+        match turned.n_vouched(patch.leaves()) {
+            0 => Ok((turned, patch)),
+            n_vouched => Err(EditError::Vouched { n_vouched }),
+        }
+    }
+
+    /// An existing point as the source that turns a patch around it.
+    fn patch_source(&self, point: u32, n_points: u32) -> Result<Source, EditError> {
+        let (turned, patch) = self.patch_to_turn(point, n_points)?;
+        let position = self.propagation.tree.position(point);
+        let starts_turned = starts_turned(&self.propagation, point) != turned.turns(patch, point);
+        let patch = SourcePatch {
+            n_points: patch.n_points,
+            amid_mended: self.regions.orientation().is_turned(position) != starts_turned,
+        };
+        Ok(Source {
+            point,
+            normal: -self.oriented_normal(point),
+            origin: Origin::Picked,
+            patch: Some(patch),
+        })
     }
 
     /// The default source that is vouched for together with a mend at an existing point: another point of its region, which
@@ -89,6 +150,18 @@ impl Derived {
             stored
         }
     }
+}
+
+/// Whether a source vouches for another side than the one that its existing point starts with.
+fn is_flipped(propagation: &Propagation, source: &Source) -> bool {
+    let stored = propagation.normals[source.point as usize];
+    source.turns(stored) != starts_turned(propagation, source.point)
+}
+
+/// Whether an existing point's stored normal is turned without any source of the document.
+fn starts_turned(propagation: &Propagation, point: u32) -> bool {
+    let position = propagation.tree.position(point);
+    propagation.base_regions.orientation().is_turned(position)
 }
 
 impl Document {
@@ -136,7 +209,12 @@ impl Document {
             "the propagation is of another cloud"
         );
         let regions = propagation.base_regions.clone();
-        let derived = self.derived.insert(Derived { propagation, regions });
+        let turned = propagation.patches.clone().map(TurnedPatches::new);
+        let derived = self.derived.insert(Derived {
+            propagation,
+            regions,
+            turned,
+        });
         derived.set(self.sources.iter().map(|&source| (source.point, Some(source))));
     }
 
@@ -159,12 +237,11 @@ impl Document {
     /// Whether a source is *flipped*: it vouches for the other side than the one its point has without any source. Before
     /// the first [`Self::install`] none is, and neither is one past the end of the cloud.
     pub fn is_flipped(&self, source: &Source) -> bool {
-        let point = source.point;
-        self.derived.as_ref().is_some_and(|derived| {
-            let normals = &derived.propagation.normals;
-            let stored = normals.get(point as usize);
-            stored.is_some_and(|&stored| source.turns(stored) != derived.regions.starts_turned(point))
-        })
+        let exists = self.check_point(source.point).is_ok();
+        exists
+            && self
+                .propagation()
+                .is_some_and(|propagation| is_flipped(propagation, source))
     }
 
     /// Applies an edit, remembers its inverse, forgets what was undone. Returns what turned.
@@ -202,6 +279,31 @@ impl Document {
         Ok(derived
             .regions
             .preview_beside(point, derived.default_source_beside(point, &self.sources)))
+    }
+
+    /// The patches that a click on `point` can turn, and which by default; `None` where the propagation has no patches or the
+    /// point is vouched for itself. In time of their nesting, which is some tens deep.
+    ///
+    /// # Errors
+    /// [`EditError`] as [`Self::apply`].
+    pub fn offer(&self, point: u32) -> Result<Option<Offer>, EditError> {
+        let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
+        self.check_point(point)?;
+        Ok(derived.turned.as_ref().and_then(|turned| {
+            let may_turn = |leaves| !turned.any_vouched(leaves);
+            turned.patches().offer(point, may_turn)
+        }))
+    }
+
+    /// What `Edit::TurnPatch` would turn, without changing anything.
+    ///
+    /// # Errors
+    /// [`EditError`] as [`Self::apply`].
+    pub fn preview_turn_patch(&self, point: u32, n_points: u32) -> Result<Change, EditError> {
+        let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
+        self.check_point(point)?;
+        let (turned, patch) = derived.patch_to_turn(point, n_points)?;
+        Ok(turned.patches().positions(patch, &derived.propagation.tree))
     }
 
     /// What `Edit::TurnWhole(point)` would turn, without changing anything.
@@ -301,25 +403,35 @@ impl Document {
             &Edit::Mend(point) => {
                 let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
                 self.check_point(point)?;
-                let mut changes = vec![change(point, Some(derived.mended(point)))];
+                let mut changes = vec![change(point, Some(derived.mended(point, &self.sources)))];
                 if let Some(default) = derived.default_source_beside(point, &self.sources) {
                     let normal = derived.oriented_normal(default);
                     let source = Source {
                         point: default,
                         normal,
                         origin: Origin::Default,
+                        patch: None,
                     };
                     changes.push(change(default, Some(source)));
                     changes.sort_unstable_by_key(|change| change.point);
                 }
                 changes.into()
             }
+            &Edit::TurnPatch { point, n_points } => {
+                let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
+                self.check_point(point)?;
+                Box::new([change(point, Some(derived.patch_source(point, n_points)?))])
+            }
             &Edit::TurnWhole(point) => {
                 let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
                 self.check_point(point)?;
                 let source = match derived.regions.source_of(point) {
-                    Some(source) => self.source(source)?.opposite(),
-                    None => derived.mended(point),
+                    Some(source) => match self.sources.get(source) {
+                        Some(source) => source.opposite_amid_opposite(),
+                        // A voted source is overruled where it stands.
+                        None => derived.mended(source, &self.sources),
+                    },
+                    None => derived.mended(point, &self.sources),
                 };
                 Box::new([change(source.point, Some(source))])
             }

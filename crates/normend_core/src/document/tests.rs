@@ -4,8 +4,11 @@ use fixedbitset::FixedBitSet;
 use glam::DVec3;
 use proptest::prelude::*;
 use proptest::sample::Index;
+use proptest::test_runner::TestCaseError;
 
 use super::*;
+use crate::Patches;
+use crate::patches::tests::{OwnLevels, any_levels, borrowed};
 use crate::regions::literal::World;
 
 /// Few directions, so that sources are often perpendicular to stored normals.
@@ -26,6 +29,7 @@ fn source(point: u32, normal: Vec3) -> Source {
         point,
         normal,
         origin: Origin::Picked,
+        patch: None,
     }
 }
 
@@ -47,6 +51,8 @@ fn propagation_of(world: &World, normals: &[Vec3]) -> Propagation {
             world.initially_turned.clone(),
         ),
         default_sources: default_sources(&world.tree),
+        patches: None,
+        voted_sources: Arc::default(),
         seconds: Vec::new(),
     }
 }
@@ -57,8 +63,46 @@ fn default_sources(tree: &crate::SpanningTree) -> Vec<u32> {
     tree.roots().iter().map(last).collect()
 }
 
-/// What Algorithm 1 makes of the document's sources.
+/// A propagation with the patches of `levels`, if any.
+fn propagation_in(setting: &Setting) -> Propagation {
+    let (world, normals, levels) = setting;
+    Propagation {
+        patches: levels
+            .as_ref()
+            .map(|levels| Arc::new(Patches::new(&world.tree, &borrowed(levels)))),
+        ..propagation_of(world, normals)
+    }
+}
+
+/// The points whose patches are turned, each source decided after those of larger patches.
+fn turned_points(document: &Document, world: &World) -> FixedBitSet {
+    let propagation = document.propagation().unwrap();
+    let mut turned = FixedBitSet::with_capacity(world.n_points);
+    let Some(patches) = &propagation.patches else {
+        return turned;
+    };
+    let mut of_sources: Vec<_> = document
+        .sources()
+        .iter()
+        .filter_map(|source| Some((source, source.patch?)))
+        .map(|(source, patch)| (source, patches.find(source.point, patch.n_points), patch.amid_mended))
+        .collect();
+    of_sources.sort_by_key(|(source, patch, _)| (std::cmp::Reverse(patch.n_points), source.point));
+    for (source, patch, amid_mended) in of_sources {
+        let point = source.point as usize;
+        let around = document.is_flipped(source) != turned.contains(point);
+        if around != amid_mended {
+            let positions = patches.positions(patch, &world.tree);
+            let points = positions.ranges().iter().flat_map(Clone::clone);
+            points.for_each(|position| turned.toggle(world.tree.order()[position as usize] as usize));
+        }
+    }
+    turned
+}
+
+/// What Algorithm 1 makes of the document's sources and turned patches.
 fn expect(document: &Document, world: &World) -> FixedBitSet {
+    let world = &world.with_turned(&turned_points(document, world));
     let normals = &document.propagation().unwrap().normals;
     let sources: BTreeMap<_, _> = document
         .sources()
@@ -76,7 +120,9 @@ fn expect(document: &Document, world: &World) -> FixedBitSet {
 enum Act {
     Mend(u32),
     TurnWhole(u32),
-    Add(Vec<(u32, Vec3)>),
+    /// The patch of at least so many points.
+    TurnPatch(u32, u32),
+    Add(Vec<(u32, Vec3, Option<SourcePatch>)>),
     /// Some of the sources, each perhaps twice.
     Remove(Vec<Index>),
     Flip(Vec<Index>),
@@ -86,28 +132,42 @@ enum Act {
     Install,
 }
 
-fn acts(n_points: usize) -> impl Strategy<Value = Vec<Act>> {
+fn acts(n_points: usize, most: usize) -> impl Strategy<Value = Vec<Act>> {
     let points = 0..n_points as u32;
     let some = || prop::collection::vec(any::<Index>(), 0..5);
+    let patch = prop_oneof![
+        3 => Just(None),
+        1 => (0..n_points as u32, any::<bool>())
+            .prop_map(|(n_points, amid_mended)| Some(SourcePatch { n_points, amid_mended })),
+    ];
     let act = prop_oneof![
         4 => points.clone().prop_map(Act::Mend),
         1 => points.clone().prop_map(Act::TurnWhole),
-        2 => prop::collection::vec((points, directions()), 0..8).prop_map(Act::Add),
+        4 => (points.clone(), 0..n_points as u32 / 2 + 2).prop_map(|(point, n_points)| Act::TurnPatch(point, n_points)),
+        2 => prop::collection::vec((points, directions(), patch), 0..8).prop_map(Act::Add),
         2 => some().prop_map(Act::Remove),
         2 => some().prop_map(Act::Flip),
         4 => Just(Act::Undo),
         3 => Just(Act::Redo),
         1 => Just(Act::Install),
     ];
-    prop::collection::vec(act, 0..40)
+    prop::collection::vec(act, 0..most)
 }
 
-/// Two worlds of the same points with normals for each, and what is done in them.
-fn sessions() -> impl Strategy<Value = ([(World, Vec<Vec3>); 2], Vec<Act>)> {
-    (1_usize..25).prop_flat_map(|n_points| {
-        let world = || (World::any(n_points), prop::collection::vec(directions(), n_points));
-        ([world(), world()], acts(n_points))
+/// A world with normals and perhaps levels of patches.
+type Setting = (World, Vec<Vec3>, Option<OwnLevels>);
+
+fn settings(n_points: usize) -> impl Strategy<Value = Setting> {
+    let normals = prop::collection::vec(directions(), n_points);
+    (World::any(n_points), normals, prop::bool::weighted(0.7)).prop_flat_map(|(world, normals, has_patches)| {
+        let levels = any_levels(Arc::clone(&world.tree));
+        levels.prop_map(move |levels| (world.clone(), normals.clone(), has_patches.then_some(levels)))
     })
+}
+
+/// Two settings of the same points, and what is done in them.
+fn sessions(most: usize) -> impl Strategy<Value = ([Setting; 2], Vec<Act>)> {
+    (1_usize..25).prop_flat_map(move |n_points| ([settings(n_points), settings(n_points)], acts(n_points, most)))
 }
 
 /// The edit that an act is, given the present sources.
@@ -123,8 +183,15 @@ fn edit_of(act: &Act, document: &Document) -> Option<Edit> {
     match act {
         Act::Mend(point) => Some(Edit::Mend(*point)),
         Act::TurnWhole(point) => Some(Edit::TurnWhole(*point)),
+        &Act::TurnPatch(point, n_points) => Some(Edit::TurnPatch { point, n_points }),
         Act::Add(added) => Some(Edit::AddSources(
-            added.iter().map(|&(point, normal)| source(point, normal)).collect(),
+            added
+                .iter()
+                .map(|&(point, normal, patch)| Source {
+                    patch,
+                    ..source(point, normal)
+                })
+                .collect(),
         )),
         Act::Remove(chosen) => Some(Edit::RemoveSources(some_of(chosen))),
         Act::Flip(chosen) => Some(Edit::FlipSources(some_of(chosen))),
@@ -142,78 +209,99 @@ fn turned(document: &Document, change: &Change) -> FixedBitSet {
     bits
 }
 
+/// Does `acts`, and compares the document with Algorithm 1 and with its earlier states after each.
+fn check_session(worlds: &[Setting; 2], acts: Vec<Act>) -> Result<(), TestCaseError> {
+    let mut document = document_of(worlds[0].0.n_points);
+    let mut installed = 0;
+    document.install(propagation_in(&worlds[0]));
+    // Sources and revision after each edit that can be undone or redone, and which of these states holds.
+    let mut states = vec![(document.sources().clone(), document.revision())];
+    let mut present = 0;
+    for act in acts {
+        let before = document.orientation().unwrap().bits().clone();
+        let mut change = Change::default();
+        match (edit_of(&act, &document), &act) {
+            (Some(edit), _) => {
+                let preview = match edit {
+                    Edit::TurnPatch { point, n_points } => {
+                        let preview = document.preview_turn_patch(point, n_points);
+                        if let Err(refused) = preview {
+                            prop_assert_eq!(document.apply(edit), Err(refused));
+                            continue;
+                        }
+                        preview.ok()
+                    }
+                    Edit::Mend(point) => Some(document.preview_mend(point).unwrap()),
+                    Edit::TurnWhole(point) => Some(document.preview_turn_whole(point).unwrap()),
+                    _ => None,
+                };
+                change = document.apply(edit).unwrap();
+                prop_assert!(preview.is_none_or(|preview| preview == change && !change.is_empty()));
+                if document.sources() == &states[present].0 {
+                    prop_assert!(change.is_empty());
+                } else {
+                    states.truncate(present + 1);
+                    prop_assert!(states.iter().all(|(_, revision)| *revision != document.revision()));
+                    states.push((document.sources().clone(), document.revision()));
+                    present += 1;
+                }
+            }
+            (None, Act::Undo) => {
+                let undone = document.undo();
+                prop_assert_eq!(undone.is_some(), present > 0);
+                change = undone.unwrap_or_default();
+                present = present.saturating_sub(1);
+            }
+            (None, Act::Redo) => {
+                let redone = document.redo();
+                prop_assert_eq!(redone.is_some(), present + 1 < states.len());
+                change = redone.unwrap_or_default();
+                present = (present + 1).min(states.len() - 1);
+            }
+            (None, _) => {
+                installed = 1 - installed;
+                document.install(propagation_in(&worlds[installed]));
+            }
+        }
+        if !matches!(act, Act::Install) {
+            prop_assert_eq!(turned(&document, &change), before);
+        }
+        prop_assert_eq!(
+            (document.sources(), document.revision()),
+            (&states[present].0, states[present].1)
+        );
+        prop_assert_eq!(document.next_undo().is_some(), present > 0);
+        prop_assert_eq!(document.next_redo().is_some(), present + 1 < states.len());
+        prop_assert_eq!(
+            document.orientation().unwrap().bits(),
+            &expect(&document, &worlds[installed].0)
+        );
+        for source in document.sources().iter() {
+            let shown = document.oriented_normal(source.point).unwrap();
+            prop_assert!(!source.turns(shown) || source.normal.dot(shown) == 0.0);
+        }
+    }
+    Ok(())
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
 
     #[test]
-    fn any_session_is_algorithm_1_and_undo_restores_the_state((worlds, acts) in sessions()) {
-        let mut document = document_of(worlds[0].0.n_points);
-        let mut installed = 0;
-        document.install(propagation_of(&worlds[0].0, &worlds[0].1));
-        // Sources and revision after each edit that can be undone or redone, and which of these states holds.
-        let mut states = vec![(document.sources().clone(), document.revision())];
-        let mut present = 0;
-        for act in acts {
-            let before = document.orientation().unwrap().bits().clone();
-            let mut change = Change::default();
-            match (edit_of(&act, &document), &act) {
-                (Some(edit), _) => {
-                    let preview = match edit {
-                        Edit::Mend(point) => Some(document.preview_mend(point).unwrap()),
-                        Edit::TurnWhole(point) => Some(document.preview_turn_whole(point).unwrap()),
-                        _ => None,
-                    };
-                    change = document.apply(edit).unwrap();
-                    prop_assert!(preview.is_none_or(|preview| preview == change && !change.is_empty()));
-                    if document.sources() == &states[present].0 {
-                        prop_assert!(change.is_empty());
-                    } else {
-                        states.truncate(present + 1);
-                        prop_assert!(states.iter().all(|(_, revision)| *revision != document.revision()));
-                        states.push((document.sources().clone(), document.revision()));
-                        present += 1;
-                    }
-                }
-                (None, Act::Undo) => {
-                    let undone = document.undo();
-                    prop_assert_eq!(undone.is_some(), present > 0);
-                    change = undone.unwrap_or_default();
-                    present = present.saturating_sub(1);
-                }
-                (None, Act::Redo) => {
-                    let redone = document.redo();
-                    prop_assert_eq!(redone.is_some(), present + 1 < states.len());
-                    change = redone.unwrap_or_default();
-                    present = (present + 1).min(states.len() - 1);
-                }
-                (None, _) => {
-                    installed = 1 - installed;
-                    document.install(propagation_of(&worlds[installed].0, &worlds[installed].1));
-                }
-            }
-            if !matches!(act, Act::Install) {
-                prop_assert_eq!(turned(&document, &change), before);
-            }
-            prop_assert_eq!((document.sources(), document.revision()), (&states[present].0, states[present].1));
-            prop_assert_eq!(document.next_undo().is_some(), present > 0);
-            prop_assert_eq!(document.next_redo().is_some(), present + 1 < states.len());
-            prop_assert_eq!(document.orientation().unwrap().bits(), &expect(&document, &worlds[installed].0));
-            for source in document.sources().iter() {
-                let shown = document.oriented_normal(source.point).unwrap();
-                prop_assert!(!source.turns(shown) || source.normal.dot(shown) == 0.0);
-            }
-        }
+    fn any_session_is_algorithm_1_and_undo_restores_the_state((worlds, acts) in sessions(40)) {
+        check_session(&worlds, acts)?;
     }
 
     #[test]
-    fn undoing_all_restores_every_bit_and_redoing_all_too((worlds, acts) in sessions()) {
+    fn undoing_all_restores_every_bit_and_redoing_all_too((worlds, acts) in sessions(40)) {
         let mut document = document_of(worlds[0].0.n_points);
-        document.install(propagation_of(&worlds[0].0, &worlds[0].1));
+        document.install(propagation_in(&worlds[0]));
         let mut bits = vec![document.orientation().unwrap().clone()];
         for act in acts {
             if let Some(edit) = edit_of(&act, &document) {
                 let revision = document.revision();
-                document.apply(edit).unwrap();
+                // A patch may be refused; then nothing changes.
+                drop(document.apply(edit));
                 if document.revision() != revision {
                     bits.push(document.orientation().unwrap().clone());
                 }
@@ -229,6 +317,15 @@ proptest! {
             prop_assert_eq!(document.orientation().unwrap(), expect);
         }
         prop_assert!(document.redo().is_none());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(20))]
+
+    #[test]
+    fn so_are_long_sessions((worlds, acts) in sessions(1000)) {
+        check_session(&worlds, acts)?;
     }
 }
 

@@ -1,5 +1,7 @@
 //! Patches against sets of points by brute force; random hierarchies over small random trees.
 
+use std::sync::Arc;
+
 use fixedbitset::FixedBitSet;
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -8,9 +10,9 @@ use super::*;
 use crate::regions::literal::World;
 
 /// Levels with their own arrays.
-type OwnLevels = Vec<(Vec<u32>, Vec<f32>)>;
+pub(crate) type OwnLevels = Vec<(Vec<u32>, Vec<f32>)>;
 
-fn borrowed(levels: &OwnLevels) -> Vec<Level<'_>> {
+pub(crate) fn borrowed(levels: &OwnLevels) -> Vec<Level<'_>> {
     levels
         .iter()
         .map(|(parents, strengths)| Level { parents, strengths })
@@ -18,7 +20,7 @@ fn borrowed(levels: &OwnLevels) -> Vec<Level<'_>> {
 }
 
 /// Random levels over the tree of `world`: at each, some of the edges that are left are merged over.
-pub(crate) fn levels(tree: &SpanningTree, merges: &[Vec<Index>], strengths: &[i8]) -> OwnLevels {
+fn levels(tree: &SpanningTree, merges: &[Vec<Index>], strengths: &[i8]) -> OwnLevels {
     let n_points = tree.n_points();
     let mut strengths = strengths.iter().cycle().map(|&strength| f32::from(strength) / 4.0);
     let mut some = |n: usize| -> Vec<f32> { strengths.by_ref().take(n).collect() };
@@ -99,15 +101,19 @@ fn points_of(change: &Change, tree: &SpanningTree) -> FixedBitSet {
     points
 }
 
+/// Random levels over `tree`.
+pub(crate) fn any_levels(tree: Arc<SpanningTree>) -> impl Strategy<Value = OwnLevels> {
+    let merges = prop::collection::vec(prop::collection::vec(any::<Index>(), 0..8), 0..8);
+    let strengths = prop::collection::vec(-4_i8..=4, 1..50);
+    (merges, strengths).prop_map(move |(merges, strengths)| levels(&tree, &merges, &strengths))
+}
+
 fn worlds() -> impl Strategy<Value = (World, OwnLevels)> {
     (1_usize..30).prop_flat_map(|n_points| {
-        let merges = prop::collection::vec(prop::collection::vec(any::<Index>(), 0..8), 0..8);
-        (World::any(n_points), merges, prop::collection::vec(-4_i8..=4, 1..50)).prop_map(
-            |(world, merges, strengths)| {
-                let levels = levels(&world.tree, &merges, &strengths);
-                (world, levels)
-            },
-        )
+        World::any(n_points).prop_flat_map(|world| {
+            let levels = any_levels(Arc::clone(&world.tree));
+            (Just(world), levels)
+        })
     })
 }
 

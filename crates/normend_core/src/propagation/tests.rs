@@ -287,3 +287,45 @@ fn does_not_depend_on_rotation() {
         }
     }
 }
+
+#[test]
+fn voted_sources_decide_the_sides() {
+    let shape = shapes::torus(4000);
+    let cloud = PointCloud::new(DVec3::ZERO, shape.positions).unwrap();
+    for preset in [Preset::Tree, Preset::Paper] {
+        let propagation = Propagation::new(&cloud, None, preset.parameters(), &Silent).unwrap();
+        let is_voted = preset == Preset::Paper;
+        assert_eq!(propagation.voted_sources.is_empty(), !is_voted);
+        assert_eq!(
+            propagation.base_regions.n_regions(),
+            propagation.voted_sources.len().max(1)
+        );
+        assert_eq!(
+            propagation.seconds.iter().any(|(stage, _)| *stage == Stage::Sources),
+            is_voted
+        );
+        let oriented = propagation.initial_normals();
+        for source in propagation.voted_sources.iter() {
+            assert_eq!(oriented[source.point as usize], source.normal);
+            assert_eq!(propagation.voted_source(source.point), Some(*source));
+        }
+        let comparison = metrics::compare(&cloud, &shape.normals, &oriented, &Silent).unwrap();
+        // Corners of the bounding box see a little of the tube's inside through the hole.
+        let n_allowed = if is_voted { 100 } else { 0 };
+        assert!(comparison.n_wrong <= n_allowed, "{}: {}", preset.name(), comparison.n_wrong);
+    }
+}
+
+#[test]
+fn given_signs_need_no_votes() {
+    let shape = shapes::sphere(500);
+    let cloud = PointCloud::new(DVec3::ZERO, shape.positions).unwrap();
+    let parameters = Parameters {
+        start: Start::Keep,
+        ..Preset::Paper.parameters()
+    };
+    let inward: Vec<Vec3> = shape.normals.iter().map(|&normal| -normal).collect();
+    let propagation = Propagation::new(&cloud, Some(&inward), parameters, &Silent).unwrap();
+    assert!(propagation.voted_sources.is_empty());
+    assert_eq!(propagation.initial_normals(), inward);
+}

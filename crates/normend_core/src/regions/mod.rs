@@ -8,8 +8,7 @@
 //! source's, and a changed sign cuts nothing.
 //!
 //! *Turned patches* change what the edges across their boundaries say, and nothing else: signs travel within a patch
-//! and outside it as before. So each default sign in a patch turns, and so does each sign that a source outside the patch
-//! gives in it; no source is needed to hold the patch, and none turns anything when it is turned.
+//! and outside it as before. So every sign in a patch turns, and no other: no source is needed to hold the patch.
 //!
 //! Invariants: a region is known by its top, the position whose parent edge is cut, or a root; it is the top's subtree
 //! without the subtrees of the tops in it; it holds at most one source, and where its base region has a source, exactly one. The
@@ -108,6 +107,11 @@ impl Regions {
         self.initial_tops.count_ones(..)
     }
 
+    /// Number of regions: each has a source, or is a base region without one. O(n / 64).
+    pub fn n_regions(&self) -> usize {
+        self.tops.len()
+    }
+
     /// Number of sources.
     pub fn n_sources(&self) -> usize {
         self.source_by_top.len()
@@ -139,10 +143,14 @@ impl Regions {
         self.set_and_turn(sources, &Change::default())
     }
 
-    /// [`Self::set`], together with turning patches, or turning them back: the default signs of all positions in `patches`
-    /// turn, and so do the signs that sources give, but those of the sources themselves. The order of turns does not matter.
+    /// [`Self::set`], after turning patches, or turning them back: all positions in `patches` turn, by default and with the
+    /// sources that there are. Sources in them vouch for their other side from then on, if `sources` does not say otherwise.
     pub fn set_and_turn(&mut self, sources: impl IntoIterator<Item = (u32, Option<bool>)>, patches: &Change) -> Change {
-        let mut flips = Vec::new();
+        for range in patches.ranges() {
+            self.default_orientation.flip(range.clone());
+            self.orientation.flip(range.clone());
+        }
+        let mut flips = patches.ranges().to_vec();
         let mut wanted = BTreeMap::new();
         for (point, turned) in sources {
             let position = self.tree.position(point);
@@ -157,21 +165,6 @@ impl Regions {
                 }
             }
         }
-        if !patches.is_empty() {
-            for (&top, &source) in self
-                .source_by_top
-                .iter()
-                .filter(|(_, source)| patches.contains(**source))
-            {
-                let turned = self.orientation.is_turned(source);
-                wanted.entry(source).or_insert((turned, top));
-            }
-        }
-        for range in patches.ranges() {
-            self.default_orientation.flip(range.clone());
-            self.orientation.flip(range.clone());
-        }
-        flips.extend_from_slice(patches.ranges());
         for (position, (turned, top)) in wanted {
             if self.orientation.is_turned(position) != turned {
                 // A later cut or merge may have given the source another top.
@@ -181,11 +174,6 @@ impl Regions {
             }
         }
         Change::from_flips(&flips)
-    }
-
-    /// Whether the stored normal of `point` is turned when there is no source: by its default sign. O(1).
-    pub fn starts_turned(&self, point: u32) -> bool {
-        self.default_orientation.is_turned(self.tree.position(point))
     }
 
     /// Whether `a` and `b` are in one region.

@@ -24,6 +24,11 @@ impl PositionSet {
         }
     }
 
+    /// Number of members. O(n / 64).
+    pub fn len(&self) -> usize {
+        self.levels[0].iter().map(|word| word.count_ones() as usize).sum()
+    }
+
     /// Whether `position` is a member.
     #[inline]
     pub fn contains(&self, position: u32) -> bool {
