@@ -25,9 +25,9 @@ mod turned_patches;
 #[cfg(test)]
 mod patch_tests;
 #[cfg(test)]
-mod voted_tests;
-#[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod voted_tests;
 
 pub use edit::{Edit, EditError};
 use history::{History, SourceChange, Step};
