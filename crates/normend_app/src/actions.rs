@@ -54,7 +54,17 @@ impl App {
                 document.and_then(Document::next_redo).is_some(),
                 "there is nothing to redo",
             ),
-            Command::MendHere | Command::TurnWholeHere => check(is_oriented, "the scan is not oriented yet"),
+            Command::MendHere | Command::MendAlongTreeHere | Command::TurnWholeHere => {
+                check(is_oriented, "the scan is not oriented yet")
+            }
+            Command::LargerPatch | Command::SmallerPatch => {
+                check(is_oriented, "the scan is not oriented yet")?;
+                let propagation = document.and_then(Document::propagation);
+                check(
+                    propagation.is_some_and(|propagation| propagation.patches.is_some()),
+                    "the scan was oriented without patches",
+                )
+            }
             Command::SelectAllSources => check(
                 document.is_some_and(|document| !document.sources().is_empty()),
                 "there are no sources",
@@ -149,11 +159,16 @@ impl App {
             Command::Undo => self.step_history(Session::undo),
             Command::Redo => self.step_history(Session::redo),
             Command::MendHere => self.click_here(egui::Modifiers::NONE),
+            Command::MendAlongTreeHere => self.click_here(egui::Modifiers::ALT),
+            Command::LargerPatch => self.mend.step(1),
+            Command::SmallerPatch => self.mend.step(-1),
             Command::TurnWholeHere => self.click_here(egui::Modifiers::COMMAND),
             Command::SetPivot => {
                 let pixel = self.meant_pixel();
-                let event = self.scene.as_ref().and_then(|scene| self.mend.pivot(scene, pixel));
-                self.handle(event);
+                if let (Some(scene), Some(session)) = (&self.scene, &self.session) {
+                    let event = self.mend.pivot(scene, &session.document, pixel);
+                    self.handle(event);
+                }
             }
             Command::SelectAllSources => {
                 if let Some(session) = &mut self.session {
@@ -197,11 +212,10 @@ impl App {
 
     fn click_here(&mut self, modifiers: egui::Modifiers) {
         let pixel = self.meant_pixel();
-        let event = self
-            .scene
-            .as_ref()
-            .and_then(|scene| self.mend.click(scene, pixel, modifiers));
-        self.handle(event);
+        if let (Some(scene), Some(session)) = (&self.scene, &self.session) {
+            let event = self.mend.click(scene, &session.document, pixel, modifiers);
+            self.handle(event);
+        }
     }
 
     fn scale_splats(&mut self, factor: f32) {

@@ -164,6 +164,11 @@ impl App {
         self.mend.n_would_turn()
     }
 
+    /// Which of the offered patches a click at the pointer would turn, the smallest is 1, and how many are offered.
+    pub fn patch_level(&self) -> Option<(usize, usize)> {
+        self.mend.level()
+    }
+
     /// The 3D view's place in the window, in points.
     pub fn view_rect(&self) -> egui::Rect {
         self.viewport.rect
@@ -263,7 +268,7 @@ impl App {
             }
         });
         Panel::bottom("status").frame(frame).show(ui, |ui| {
-            status_bar::ui(ui, self.session.as_ref(), self.mend.n_would_turn(), &self.adapter);
+            status_bar::ui(ui, self.session.as_ref(), self.mend.n_would_turn(), self.mend.level(), &self.adapter);
         });
         action
     }
@@ -326,10 +331,12 @@ impl App {
             *crate::settings::SPLAT_SCALES.start(),
             *crate::settings::SPLAT_SCALES.end(),
         );
-        let asked = match (pointer.clicked, pointer.pivot) {
-            (_, Some(pixel)) => self.mend.pivot(scene, pixel),
-            (Some(pixel), None) => self.mend.click(scene, pixel, pointer.modifiers),
-            (None, None) => None,
+        self.mend.step(pointer.steps);
+        let document = self.session.as_ref().map(|session| &session.document);
+        let asked = match (document, pointer.clicked, pointer.pivot) {
+            (Some(document), _, Some(pixel)) => self.mend.pivot(scene, document, pixel),
+            (Some(document), Some(pixel), None) => self.mend.click(scene, document, pixel, pointer.modifiers),
+            (None, ..) | (Some(_), None, None) => None,
         };
         if pointer.by_double_click {
             self.take_back_click();
@@ -385,8 +392,7 @@ impl App {
     pub(crate) fn handle(&mut self, event: Option<ToolEvent>) {
         match event {
             None => {}
-            Some(ToolEvent::Mend(point)) => self.apply_click(Edit::Mend(point)),
-            Some(ToolEvent::TurnWhole(point)) => self.apply_click(Edit::TurnWhole(point)),
+            Some(ToolEvent::Edit(edit)) => self.apply_click(edit),
             Some(ToolEvent::SelectSource { point, extend }) => self.act(Action::SelectSource { point, extend }),
             Some(ToolEvent::Deselect) => self.deselect(),
             Some(ToolEvent::Pivot(point)) => self.viewport.camera.set_pivot(point),

@@ -25,8 +25,14 @@ pub enum Command {
     Redo,
     /// Mend what is under the pointer.
     MendHere,
+    /// Mend what is under the pointer along the tree, whatever patch it is in.
+    MendAlongTreeHere,
     /// Turn all that hangs together with what is under the pointer.
     TurnWholeHere,
+    /// Let a click turn a larger patch.
+    LargerPatch,
+    /// Let a click turn a smaller patch.
+    SmallerPatch,
     /// Select every source.
     SelectAllSources,
     /// Turn the selected sources.
@@ -164,6 +170,10 @@ const fn shift(logical_key: Key) -> KeyboardShortcut {
     KeyboardShortcut::new(Modifiers::SHIFT, logical_key)
 }
 
+const fn alt(logical_key: Key) -> KeyboardShortcut {
+    KeyboardShortcut::new(Modifiers::ALT, logical_key)
+}
+
 const fn ctrl_shift(logical_key: Key) -> KeyboardShortcut {
     KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), logical_key)
 }
@@ -176,7 +186,7 @@ macro_rules! row {
 
 impl Command {
     /// All commands, in the order of menus.
-    pub const ALL: [Self; 36] = [
+    pub const ALL: [Self; 39] = [
         Self::Open,
         Self::OpenPath,
         Self::OpenSample,
@@ -185,7 +195,10 @@ impl Command {
         Self::Undo,
         Self::Redo,
         Self::MendHere,
+        Self::MendAlongTreeHere,
         Self::TurnWholeHere,
+        Self::LargerPatch,
+        Self::SmallerPatch,
         Self::SelectAllSources,
         Self::FlipSources,
         Self::RemoveSources,
@@ -228,8 +241,17 @@ impl Command {
                 row!(Edit 0, "Redo", "Apply the last undone edit again", [ctrl_shift(Key::Z), ctrl(Key::Y)])
             }
             Self::MendHere => row!(Edit 1, "Mend here", "Turn the region under the pointer", [key(Key::Enter)]),
+            Self::MendAlongTreeHere => {
+                row!(Edit 1, "Mend along the tree here", "Turn what the heaviest edge of the tree separates from the other sources, instead of a patch", [alt(Key::Enter)])
+            }
             Self::TurnWholeHere => {
                 row!(Edit 1, "Turn whole region here", "Turn all that hangs together with the point under the pointer", [shift(Key::Enter)])
+            }
+            Self::LargerPatch => {
+                row!(Edit 1, "Larger patch", "Let a click turn the next larger patch around the pointer", [key(Key::CloseBracket)])
+            }
+            Self::SmallerPatch => {
+                row!(Edit 1, "Smaller patch", "Let a click turn the next smaller patch around the pointer", [key(Key::OpenBracket)])
             }
             Self::SelectAllSources => row!(Edit 2, "Select all sources", "Select every source", [ctrl(Key::A)]),
             Self::FlipSources => row!(Edit 2, "Flip sources", "Turn the selected sources", [key(Key::X)]),
@@ -324,6 +346,8 @@ pub fn shortcut_text(ctx: &egui::Context, shortcut: &KeyboardShortcut) -> String
         Key::Plus => "+",
         Key::Minus => "−",
         Key::Equals => "=",
+        Key::OpenBracket => "[",
+        Key::CloseBracket => "]",
         Key::Period => ".",
         Key::Questionmark => "?",
         Key::ArrowLeft => "Left arrow",
@@ -338,10 +362,12 @@ pub fn shortcut_text(ctx: &egui::Context, shortcut: &KeyboardShortcut) -> String
 }
 
 /// What the mouse does in the 3D view, and how: the first part of the sheet of shortcuts.
-pub const MOUSE: [(&str, &str); 10] = [
+pub const MOUSE: [(&str, &str); 12] = [
     ("Show what a click would turn", "Move over the scan"),
     ("Mend here", "Click"),
+    ("Mend along the tree here", "Alt+click"),
     ("Turn whole region here", "Ctrl+click"),
+    ("Larger or smaller patch", "Press, turn the wheel, release"),
     ("Select a source (Shift adds)", "Click its sphere"),
     ("Orbit", "Left drag"),
     ("Pan", "Right, middle or Shift+left drag"),
@@ -437,6 +463,8 @@ mod tests {
         check(Command::SetPivot, ".");
         check(Command::LargerSplats, "+ or =");
         check(Command::SmallerSplats, "−");
+        check(Command::LargerPatch, "]");
+        check(Command::MendAlongTreeHere, "Alt+Enter");
         check(Command::Shortcuts, "F1 or ?");
         check(Command::OrbitLeft, "Left arrow");
         check(Command::About, "");
@@ -444,7 +472,12 @@ mod tests {
 
     #[test]
     fn menu_and_mouse_call_the_same_thing_the_same() {
-        for command in [Command::MendHere, Command::TurnWholeHere, Command::SetPivot] {
+        for command in [
+            Command::MendHere,
+            Command::MendAlongTreeHere,
+            Command::TurnWholeHere,
+            Command::SetPivot,
+        ] {
             assert!(MOUSE.iter().any(|(what, _)| *what == command.label()), "{command:?}");
         }
     }

@@ -95,7 +95,7 @@ impl Session {
     /// As [`Document::apply`].
     pub fn apply(&mut self, edit: Edit) -> Result<Change, EditError> {
         let made = match edit {
-            Edit::Mend(point) | Edit::TurnWhole(point) => Some(point),
+            Edit::Mend(point) | Edit::TurnPatch { point, .. } | Edit::TurnWhole(point) => Some(point),
             _ => None,
         };
         let change = self.document.apply(edit)?;

@@ -29,7 +29,25 @@ pub struct Viewport {
     pace: Pace,
     /// How far the present drag has come, in points.
     dragged: Vec2,
+    hold: Option<Hold>,
+    /// The wheel was turned while the button was held, and egui still smooths that out: it is no zooming.
+    is_wheel_settling: bool,
 }
+
+/// The main button is held down in the view, and the pointer rests.
+#[derive(Clone, Copy, Debug)]
+struct Hold {
+    pixel: Pixel,
+    position: Pos2,
+    /// The wheel was turned meanwhile, so the release is a click, however late.
+    is_choosing: bool,
+    /// What the wheel turned and was not given out yet, in notches.
+    notches: f32,
+}
+
+/// How much a touchpad scrolls for one notch of a wheel, in points: about a line of text and a half, so that a swipe is a
+/// few notches.
+const POINTS_PER_NOTCH: f32 = 24.0;
 
 /// What the pointer did in the view this frame.
 #[derive(Clone, Debug, Default)]
@@ -42,6 +60,8 @@ pub struct PointerOnView {
     pub clicked: Option<Pixel>,
     /// The modifier keys that are held.
     pub modifiers: Modifiers,
+    /// Notches that the wheel was turned while the main button was held, away from the user positive.
+    pub steps: i32,
     /// A double-click or a middle click: the pivot goes there.
     pub pivot: Option<Pixel>,
     /// The pivot was asked for by a double-click, whose first click counted as a click.
@@ -60,6 +80,8 @@ impl Viewport {
             zoom_anchor: None,
             pace: Pace::new(),
             dragged: Vec2::ZERO,
+            hold: None,
+            is_wheel_settling: false,
         }
     }
 
@@ -162,6 +184,7 @@ impl Viewport {
         response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, "3D view"));
         self.id = Some(response.id);
 
+        let (steps, chosen) = self.follow_hold(ui, &response);
         let before = self.camera;
         self.move_camera(ui, &response, settings, under_pointer);
         let (now, frame_secs) = ui.input(|input| (input.time, input.unstable_dt));
@@ -182,26 +205,67 @@ impl Viewport {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(texture, self.rect, whole, Color32::WHITE);
         }
-        if response.dragged() || moved {
+        if (response.dragged() && self.hold.is_none()) || moved {
             self.pivot_mark(ui);
         }
         self.axis_gizmo(ui);
 
         let position = response.hover_pos();
-        let resting = !moved && !response.dragged() && self.pace.is_full();
+        let resting = !moved && (self.hold.is_some() || !response.dragged()) && self.pace.is_full();
         let clicked_at = response
             .interact_pointer_pos()
             .and_then(|position| self.pixel(position));
         let double_clicked = response.double_clicked_by(PointerButton::Primary);
         let pivot = double_clicked || response.clicked_by(PointerButton::Middle);
         PointerOnView {
-            hovered: position.filter(|_| resting).and_then(|position| self.pixel(position)),
+            hovered: position
+                .filter(|_| resting)
+                .and_then(|position| self.hold.map_or_else(|| self.pixel(position), |hold| Some(hold.pixel))),
             position,
-            clicked: clicked_at.filter(|_| response.clicked_by(PointerButton::Primary) && !double_clicked),
+            clicked: clicked_at
+                .filter(|_| response.clicked_by(PointerButton::Primary) && !double_clicked)
+                .or(chosen),
+            steps,
             modifiers: ui.input(|input| input.modifiers),
             pivot: clicked_at.filter(|_| pivot),
             by_double_click: double_clicked,
         }
+    }
+
+    /// Follows the wheel while the main button is held. Returns the notches of this frame, and the pixel of a release
+    /// after such.
+    fn follow_hold(&mut self, ui: &Ui, response: &egui::Response) -> (i32, Option<Pixel>) {
+        let max_distance = ui.ctx().options(|options| options.input_options.max_click_dist);
+        let (pressed, down, position) = ui.input(|input| {
+            let pointer = &input.pointer;
+            (pointer.primary_pressed(), pointer.primary_down(), pointer.latest_pos())
+        });
+        if let Some(position) = position.filter(|_| pressed && response.is_pointer_button_down_on()) {
+            self.hold = self.pixel(position).map(|pixel| Hold {
+                pixel,
+                position,
+                is_choosing: false,
+                notches: 0.0,
+            });
+        }
+        let Some(mut hold) = self.hold.take() else {
+            return (0, None);
+        };
+        let rests = position.is_some_and(|position| position.distance(hold.position) <= max_distance);
+        if !down {
+            // Who drags away from the place before the release means no click after all.
+            return (0, Some(hold.pixel).filter(|_| hold.is_choosing && rests));
+        }
+        if !rests && !hold.is_choosing {
+            return (0, None);
+        }
+        hold.notches += ui.input(|input| input.events.iter().map(notches).sum::<f32>());
+        let steps = hold.notches.trunc();
+        hold.notches -= steps;
+        hold.is_choosing |= steps != 0.0;
+        self.is_wheel_settling |= hold.is_choosing;
+        self.hold = Some(hold);
+        (steps as i32, None)
     }
 
     fn move_camera(
@@ -217,6 +281,9 @@ impl Viewport {
         let delta = (dragged - self.dragged) * self.pixels_per_point;
         self.dragged = dragged;
         let pixels = glam::Vec2::new(delta.x, delta.y);
+        if self.hold.is_some_and(|hold| hold.is_choosing) {
+            return;
+        }
         let panning = response.dragged_by(PointerButton::Secondary)
             || response.dragged_by(PointerButton::Middle)
             || (shift && response.dragged_by(PointerButton::Primary));
@@ -235,6 +302,10 @@ impl Viewport {
         let (scroll, pinch, alt) =
             ui.input(|input| (input.smooth_scroll_delta(), input.zoom_delta(), input.modifiers.alt));
         let scroll = scroll.x + scroll.y;
+        self.is_wheel_settling &= scroll != 0.0;
+        if self.is_wheel_settling || (self.hold.is_some() && scroll != 0.0) {
+            return;
+        }
         if alt && scroll != 0.0 {
             settings.splat_scale *= (scroll / 400.0).exp();
             return;
@@ -317,6 +388,18 @@ impl Viewport {
             StrokeKind::Inside,
         );
         painter.galley(min + padding, galley, color);
+    }
+}
+
+/// How far an event turns the wheel, in notches away from the user.
+fn notches(event: &egui::Event) -> f32 {
+    match event {
+        // With Shift held, some systems turn the wheel sideways.
+        egui::Event::MouseWheel { unit, delta, .. } => match unit {
+            egui::MouseWheelUnit::Point => (delta.x + delta.y) / POINTS_PER_NOTCH,
+            egui::MouseWheelUnit::Line | egui::MouseWheelUnit::Page => delta.x + delta.y,
+        },
+        _ => 0.0,
     }
 }
 

@@ -5,8 +5,14 @@ use egui::{Align, Layout, RichText, Ui};
 use crate::session::Session;
 use crate::theme::{self, SPACE_M};
 
-/// The status bar.
-pub fn ui(ui: &mut Ui, session: Option<&Session>, n_would_turn: Option<u64>, adapter: &str) {
+/// The status bar. `level` says which of the offered patches a click would turn, and of how many.
+pub fn ui(
+    ui: &mut Ui,
+    session: Option<&Session>,
+    n_would_turn: Option<u64>,
+    level: Option<(usize, usize)>,
+    adapter: &str,
+) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = SPACE_M;
         match session {
@@ -27,7 +33,10 @@ pub fn ui(ui: &mut Ui, session: Option<&Session>, n_would_turn: Option<u64>, ada
                 .on_hover_text("The graphics adapter that draws the view");
             if let Some(n_points) = n_would_turn {
                 ui.label(RichText::new("·").weak());
-                let text = format!("A click turns {}", theme::counted(n_points, "point", "points"));
+                let mut text = format!("A click turns {}", theme::counted(n_points, "point", "points"));
+                if let Some((level, n_levels)) = level {
+                    text += &format!(" (patch size {level} of {n_levels})");
+                }
                 ui.label(RichText::new(text).color(theme::accent(ui)));
             }
         });

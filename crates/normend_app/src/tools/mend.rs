@@ -2,9 +2,13 @@
 //!
 //! Picking reads ids back from the GPU, which takes a frame or more, so at most one pick is under way. A click at the
 //! pixel and picture of the last answer acts at once; another click is picked first and acts when the answer arrives.
+//!
+//! A click turns a patch where the document offers patches, by default the likeliest; the user can choose a larger or a
+//! smaller one, and that choice holds while the pointer stays on it. Elsewhere, and with Alt, it mends along the tree.
 
 use egui::Modifiers;
-use normend_core::Change;
+use normend_core::patches::{Offer, Patch};
+use normend_core::{Change, Document, Edit};
 use normend_render::PickRequest;
 
 use super::ToolEvent;
@@ -72,10 +76,15 @@ pub struct MendTool {
     preview: Option<Preview>,
     /// The pixel that was just clicked: what was turned stays plain to see until the pointer moves on.
     quiet: Option<Pixel>,
+    /// The patch that the user chose instead of the default, at a revision of the document.
+    chosen: Option<(Patch, u64)>,
+    /// Steps to larger (or, negative, smaller) patches that were asked for and not taken yet.
+    steps: i32,
 }
 
 struct Preview {
     of: Previewed,
+    aim: Aim,
     change: Change,
 }
 
@@ -83,8 +92,58 @@ struct Preview {
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Previewed {
     point: u32,
-    whole: bool,
+    means: Means,
     revision: u64,
+    chosen: Option<Patch>,
+}
+
+/// Which region of a point is meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Means {
+    /// The chosen patch, or the default one.
+    Patch,
+    /// What the tree says.
+    Tree,
+    /// All that hangs together.
+    Whole,
+}
+
+impl Means {
+    fn of(modifiers: Modifiers) -> Self {
+        if modifiers.command {
+            Self::Whole
+        } else if modifiers.alt {
+            Self::Tree
+        } else {
+            Self::Patch
+        }
+    }
+}
+
+/// What a click would do.
+struct Aim {
+    edit: Edit,
+    patch: Option<AimedPatch>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct AimedPatch {
+    patch: Patch,
+    /// How many of the offered patches are not larger, and how many are offered.
+    level: (usize, usize),
+}
+
+impl Aim {
+    fn preview(&self, document: &Document) -> Option<Change> {
+        let change = match self.edit {
+            Edit::TurnPatch { point, n_points } => document.preview_turn_patch(point, n_points),
+            Edit::TurnWhole(point) => document.preview_turn_whole(point),
+            Edit::Mend(point) => document.preview_mend(point),
+            Edit::AddSources(_) | Edit::RemoveSources(_) | Edit::FlipSources(_) => return None,
+        };
+        // Before the scan is oriented there is nothing to show.
+        change.ok()
+    }
 }
 
 impl MendTool {
@@ -98,6 +157,21 @@ impl MendTool {
         self.preview.as_ref().map(|preview| preview.change.n_points())
     }
 
+    /// Which of the offered patches a click would turn, the smallest is 1, and how many there are; `None` when it would turn no
+    /// patch.
+    pub fn level(&self) -> Option<(usize, usize)> {
+        let preview = self.preview.as_ref()?;
+        preview.aim.patch.map(|aimed| aimed.level)
+    }
+
+    /// Chooses a larger patch, that many steps; a smaller one when negative.
+    pub fn step(&mut self, steps: i32) {
+        self.steps = self.steps.saturating_add(steps);
+        if steps != 0 {
+            self.quiet = None;
+        }
+    }
+
     /// Whether an answer of the GPU is awaited.
     pub fn is_picking(&self) -> bool {
         self.pending.is_some()
@@ -109,19 +183,25 @@ impl MendTool {
         scene.highlight(None);
     }
 
-    /// Asks for the point at `pixel` to be mended; with Ctrl (Command on macOS), for all that hangs together with it to
-    /// be turned. On a source, selects it; with Shift, beside the others.
-    pub fn click(&mut self, scene: &Scene, pixel: Pixel, modifiers: Modifiers) -> Option<ToolEvent> {
+    /// Asks for the patch at `pixel` to be turned; with Alt, for what the tree says to be turned; with Ctrl (Command on macOS),
+    /// for all that hangs together with it. On a source, selects it; with Shift, beside the others.
+    pub fn click(
+        &mut self,
+        scene: &Scene,
+        document: &Document,
+        pixel: Pixel,
+        modifiers: Modifiers,
+    ) -> Option<ToolEvent> {
         self.quiet = Some(pixel);
-        self.act(scene, pixel, Purpose::Click(modifiers))
+        self.act(scene, document, pixel, Purpose::Click(modifiers))
     }
 
     /// Asks for the point at `pixel` to become the pivot.
-    pub fn pivot(&mut self, scene: &Scene, pixel: Pixel) -> Option<ToolEvent> {
-        self.act(scene, pixel, Purpose::Pivot)
+    pub fn pivot(&mut self, scene: &Scene, document: &Document, pixel: Pixel) -> Option<ToolEvent> {
+        self.act(scene, document, pixel, Purpose::Pivot)
     }
 
-    fn act(&mut self, scene: &Scene, pixel: Pixel, purpose: Purpose) -> Option<ToolEvent> {
+    fn act(&mut self, scene: &Scene, document: &Document, pixel: Pixel, purpose: Purpose) -> Option<ToolEvent> {
         let place = Place {
             pixel,
             picture_id: scene.picture_id(),
@@ -129,7 +209,7 @@ impl MendTool {
         if let Some((known, target)) = self.hovered
             && known == place
         {
-            return event(purpose, target);
+            return self.event(document, purpose, target);
         }
         self.pending = Some(Pending::new(scene, pixel, purpose));
         None
@@ -149,7 +229,7 @@ impl MendTool {
             match answer {
                 Some((place, target)) => {
                     self.hovered = Some((place, target));
-                    result = event(pending.purpose, target);
+                    result = self.event(&session.document, pending.purpose, target);
                 }
                 None => {
                     // Without a question, or when its ids mean other points now, it is asked of the newest picture.
@@ -181,49 +261,114 @@ impl MendTool {
             }
             None => {}
         }
-        self.follow(scene, session, pointer.modifiers.command);
+        self.follow(scene, &session.document, Means::of(pointer.modifiers));
         result
     }
 
-    fn follow(&mut self, scene: &mut Scene, session: &Session, whole: bool) {
-        let revision = session.document.revision();
+    fn follow(&mut self, scene: &mut Scene, document: &Document, means: Means) {
+        let revision = document.revision();
         let point = match self.target() {
             Some(Target::Point { point, .. }) if self.quiet.is_none() => Some(point),
             _ => None,
         };
-        let wanted = point.map(|point| Previewed { point, whole, revision });
+        // What was chosen for another place or another state of the document is over.
+        let holds = |&(patch, chosen_at): &(Patch, u64)| {
+            chosen_at == revision && point.is_none_or(|point| is_in(document, patch, point))
+        };
+        self.chosen = self.chosen.filter(holds);
+        if let Some(point) = point
+            && self.steps != 0
+            && let Some(aimed) = self.aim(document, point, Means::Patch).patch
+        {
+            self.chosen = Some((aimed.patch, revision));
+            self.steps = 0;
+        }
+        let wanted = point.map(|point| Previewed {
+            point,
+            means,
+            revision,
+            chosen: self.chosen.map(|(patch, _)| patch),
+        });
         if wanted == self.preview.as_ref().map(|preview| preview.of) {
             return;
         }
-        let document = &session.document;
+        let before = self.preview.take();
         self.preview = wanted.and_then(|of| {
-            let change = if whole {
-                document.preview_turn_whole(of.point)
-            } else {
-                document.preview_mend(of.point)
-            };
-            // Before the scan is oriented there is nothing to show.
-            Some(Preview {
-                of,
-                change: change.ok()?,
-            })
+            let aim = self.aim(document, of.point, of.means);
+            let known = before.filter(|before| {
+                aim.patch.is_some() && aim.patch == before.aim.patch && before.of.revision == revision
+            });
+            // Another point of the same patch turns the same points.
+            let change = known.map_or_else(|| aim.preview(document), |known| Some(known.change))?;
+            Some(Preview { of, aim, change })
         });
         scene.highlight(self.preview.as_ref().map(|preview| &preview.change));
     }
+
+    /// What a click on a point does.
+    fn aim(&self, document: &Document, point: u32, means: Means) -> Aim {
+        let offer = match means {
+            Means::Patch => document.offer(point).ok().flatten(),
+            Means::Tree | Means::Whole => None,
+        };
+        let Some(Offer { patches, default }) = offer else {
+            let edit = if means == Means::Whole {
+                Edit::TurnWhole(point)
+            } else {
+                Edit::Mend(point)
+            };
+            return Aim { edit, patch: None };
+        };
+        let chosen = self.chosen.map(|(patch, _)| patch);
+        let mut patch = chosen
+            .filter(|&patch| is_in(document, patch, point))
+            .unwrap_or(patches[default]);
+        for _ in 0..self.steps.unsigned_abs().min(patches.len() as u32) {
+            let next = if self.steps > 0 {
+                patches.iter().find(|next| next.n_points > patch.n_points)
+            } else {
+                patches.iter().rfind(|next| next.n_points < patch.n_points)
+            };
+            patch = next.copied().unwrap_or(patch);
+        }
+        let not_larger = patches
+            .iter()
+            .filter(|offered| offered.n_points <= patch.n_points)
+            .count();
+        Aim {
+            edit: Edit::TurnPatch {
+                point,
+                n_points: patch.n_points,
+            },
+            patch: Some(AimedPatch {
+                patch,
+                level: (not_larger.max(1), patches.len()),
+            }),
+        }
+    }
+
+    fn event(&mut self, document: &Document, purpose: Purpose, target: Option<Target>) -> Option<ToolEvent> {
+        match (purpose, target) {
+            (Purpose::Hover, _) | (Purpose::Pivot, None) => None,
+            (Purpose::Pivot, Some(target)) => Some(ToolEvent::Pivot(target.position())),
+            (Purpose::Click(modifiers), Some(Target::Point { point, .. })) => {
+                let aim = self.aim(document, point, Means::of(modifiers));
+                self.steps = 0;
+                Some(ToolEvent::Edit(aim.edit))
+            }
+            (Purpose::Click(modifiers), Some(Target::Source { point, .. })) => Some(ToolEvent::SelectSource {
+                point,
+                extend: modifiers.shift || modifiers.command,
+            }),
+            (Purpose::Click(_), None) => Some(ToolEvent::Deselect),
+        }
+    }
 }
 
-fn event(purpose: Purpose, target: Option<Target>) -> Option<ToolEvent> {
-    match (purpose, target) {
-        (Purpose::Hover, _) | (Purpose::Pivot, None) => None,
-        (Purpose::Pivot, Some(target)) => Some(ToolEvent::Pivot(target.position())),
-        (Purpose::Click(modifiers), Some(Target::Point { point, .. })) if modifiers.command => {
-            Some(ToolEvent::TurnWhole(point))
-        }
-        (Purpose::Click(_), Some(Target::Point { point, .. })) => Some(ToolEvent::Mend(point)),
-        (Purpose::Click(modifiers), Some(Target::Source { point, .. })) => Some(ToolEvent::SelectSource {
-            point,
-            extend: modifiers.shift || modifiers.command,
-        }),
-        (Purpose::Click(_), None) => Some(ToolEvent::Deselect),
-    }
+/// Whether a patch of the propagation in force holds a point.
+fn is_in(document: &Document, patch: Patch, point: u32) -> bool {
+    let patches = document
+        .propagation()
+        .and_then(|propagation| propagation.patches.as_ref());
+    patches.is_some_and(|patches| patch.leaves().contains(&patches.leaf(point)))
 }

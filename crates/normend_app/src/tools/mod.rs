@@ -14,18 +14,16 @@ impl Tool {
     /// How it is used, in one line.
     pub fn hint(self) -> &'static str {
         match self {
-            Self::Mend => "Mend: point at a wrong region, click to turn what is highlighted",
+            Self::Mend => "Mend: point at a wrong region, click to turn what is highlighted; [ and ] change its size",
         }
     }
 }
 
 /// What a tool asks for.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum ToolEvent {
-    /// Mend at this point.
-    Mend(u32),
-    /// Turn all that hangs together with this point.
-    TurnWhole(u32),
+    /// Change the sources.
+    Edit(normend_core::Edit),
     /// Select the source at this point.
     SelectSource {
         /// The point's id.
