@@ -1,17 +1,28 @@
-//! Depths of oriented discs under a parallel projection, seen from both ends at once.
+//! Depths of oriented discs in a picture, from in front and from behind at once.
 
-/// A disc in view coordinates: x and y in pixels, z toward the viewer above.
+/// A disc as a picture shows it: an ellipse of pixels with a plane of heights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Disc {
+    /// Column of the center, in pixels.
     pub x: f32,
+    /// Row of the center, in pixels.
     pub y: f32,
-    /// Height of the center.
-    pub z: f32,
+    /// Height of the center: the larger, the nearer to the viewer. The unit is that of the projection.
+    pub height: f32,
+    /// Rise of the height a column and a row.
+    pub slope: [f32; 2],
+    /// Radius in pixels, where the disc is seen from straight above.
     pub radius: f32,
-    /// Rise of the disc's plane along x: `−n_x / n_z`.
-    pub slope_x: f32,
-    /// Rise of the disc's plane along y: `−n_y / n_z`.
-    pub slope_y: f32,
+    /// The ellipse `a x² + 2 b x y + c y² ≤ radius²` around the center, as `[a, b, c]`.
+    pub ellipse: [f32; 3],
+    /// Heights that differ by less are of one surface.
+    pub tolerance: f32,
+}
+
+impl Disc {
+    fn height_at(&self, column: usize, row: usize) -> f32 {
+        self.height + self.slope[0] * (column as f32 + 0.5 - self.x) + self.slope[1] * (row as f32 + 0.5 - self.y)
+    }
 }
 
 /// The highest and the lowest surface at each pixel.
@@ -23,8 +34,18 @@ pub(super) struct DepthBuffer {
     lowest: Vec<f32>,
 }
 
+/// Where a look checks a disc, in radii: a look counts that sees a disc and not only a hole's width of it.
+const SAMPLES: [[f32; 2]; 5] = [[0.0, 0.0], [SAMPLE, 0.0], [-SAMPLE, 0.0], [0.0, SAMPLE], [0.0, -SAMPLE]];
+
+/// Half way to the rim and a little more: holes between random points are up to about a disc wide, and a disc at an edge
+/// still has its samples on its own surface.
+const SAMPLE: f32 = 0.6;
+
+/// Samples besides the center that may be hidden: one, as at the edge of what stands in front.
+const MAY_BE_HIDDEN: u32 = 1;
+
 impl DepthBuffer {
-    /// Makes the buffer empty and `width × height` large. Room is kept from one view to the next.
+    /// Makes the buffer empty and `width × height` pixels large. Room is kept from one picture to the next.
     pub fn clear(&mut self, width: usize, height: usize) {
         (self.width, self.height) = (width, height);
         self.highest.clear();
@@ -36,53 +57,56 @@ impl DepthBuffer {
     /// Draws a disc: every pixel whose middle it covers gets the height of its plane there.
     #[inline]
     pub fn draw(&mut self, disc: &Disc) {
-        let Disc { slope_x, slope_y, .. } = *disc;
-        // The disc covers the offset (x, y) where x² + y² + (slope_x x + slope_y y)² ≤ radius².
-        let a = 1.0 + slope_x * slope_x;
-        let b = slope_x * slope_y;
-        let c = 1.0 + slope_y * slope_y;
+        let [a, b, c] = disc.ellipse;
         let determinant = a * c - b * b;
         let squared_radius = disc.radius * disc.radius;
         let reach = (squared_radius * a / determinant).sqrt();
-        let rows = middles_between(disc.y - reach, disc.y + reach, self.height);
-        for row in rows {
+        for row in middles_between(disc.y - reach, disc.y + reach, self.height) {
             let y = row as f32 + 0.5 - disc.y;
-            let squared = a * squared_radius - determinant * y * y;
-            if squared < 0.0 {
-                continue;
-            }
+            let half = (a * squared_radius - determinant * y * y).max(0.0).sqrt() / a;
             let middle = disc.x - b * y / a;
-            let half = squared.sqrt() / a;
             let columns = middles_between(middle - half, middle + half, self.width);
-            let first = row * self.width;
-            let span = first + columns.start..first + columns.end;
-            let start = disc.z + slope_y * y + slope_x * (columns.start as f32 + 0.5 - disc.x);
-            for ((i, highest), lowest) in (0..).zip(&mut self.highest[span.clone()]).zip(&mut self.lowest[span]) {
-                let z = start + slope_x * i as f32;
-                *highest = if z > *highest { z } else { *highest };
-                *lowest = if z < *lowest { z } else { *lowest };
+            let first = disc.height_at(columns.start, row);
+            let span = row * self.width + columns.start..row * self.width + columns.end;
+            let pixels = self.highest[span.clone()].iter_mut().zip(&mut self.lowest[span]);
+            for (step, (highest, lowest)) in pixels.enumerate() {
+                let height = first + disc.slope[0] * step as f32;
+                *highest = if height > *highest { height } else { *highest };
+                *lowest = if height < *lowest { height } else { *lowest };
             }
         }
     }
 
-    /// Whether the middle of `disc` is within `tolerance` of the highest and of the lowest surface there. Heights are
-    /// compared at the middle of the pixel, so that a plane hides none of its own discs.
+    /// Whether a disc, its center within the picture, is at the highest and whether it is at the lowest surface. Heights
+    /// are compared in the middle of pixels, so that a plane hides none of its own discs.
     #[inline]
-    pub fn sees(&self, disc: &Disc, tolerance: f32) -> (bool, bool) {
-        let (column, row) = (disc.x as usize, disc.y as usize);
-        let pixel = row.min(self.height - 1) * self.width + column.min(self.width - 1);
-        let z = disc.z + disc.slope_x * (column as f32 + 0.5 - disc.x) + disc.slope_y * (row as f32 + 0.5 - disc.y);
-        (
-            z >= self.highest[pixel] - tolerance,
-            z <= self.lowest[pixel] + tolerance,
-        )
+    pub fn sees(&self, disc: &Disc) -> (bool, bool) {
+        let mut hidden = [0, 0];
+        for [x, y] in SAMPLES {
+            let column = disc.x + x * disc.radius;
+            let row = disc.y + y * disc.radius;
+            // Nothing was drawn beyond the picture, so nothing hides what is there.
+            if column < 0.0 || row < 0.0 || column as usize >= self.width || row as usize >= self.height {
+                continue;
+            }
+            let (column, row) = (column as usize, row as usize);
+            let pixel = row * self.width + column;
+            let height = disc.height_at(column, row);
+            let cost = if [x, y] == [0.0, 0.0] { MAY_BE_HIDDEN + 1 } else { 1 };
+            hidden[0] += cost * u32::from(height < self.highest[pixel] - disc.tolerance);
+            hidden[1] += cost * u32::from(height > self.lowest[pixel] + disc.tolerance);
+            if hidden[0].min(hidden[1]) > MAY_BE_HIDDEN {
+                break;
+            }
+        }
+        (hidden[0] <= MAY_BE_HIDDEN, hidden[1] <= MAY_BE_HIDDEN)
     }
 }
 
 /// The pixels of `0..n` whose middles are in `low..=high`.
 #[inline]
 fn middles_between(low: f32, high: f32, n: usize) -> std::ops::Range<usize> {
-    // Casts saturate: what is left of the picture becomes 0.
+    // Casts saturate: what is left of the picture becomes 0, and what is not a number too.
     let start = (low + 0.5) as usize;
     let end = ((high + 0.5) as usize).min(n);
     start.min(end)..end

@@ -11,9 +11,10 @@ mod frame;
 mod given;
 mod outside_views;
 mod scanner;
+mod scene;
 
 pub use given::given;
-pub use outside_views::outside_views;
+pub use outside_views::{N_VIEWS, outside_views};
 pub use scanner::{Station, scanner};
 
 /// A vote of one: what a single look at a point from straight above weighs. 1/4096 is finer than any weight is known, and
