@@ -8,8 +8,8 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Args, CommandFactory, Parser, Subcommand};
-use normend_core::shapes::ShapeKind;
 use normend_core::propagation::{ETA, VIEWS};
+use normend_core::shapes::ShapeKind;
 use normend_core::{EdgeRule, Estimator, Parameters, Preset, SourceRule, Start};
 use normend_render::{DisplayMode, StandardView};
 
@@ -165,7 +165,10 @@ impl From<PropagationArguments> for Parameters {
         let preset = typed.preset.parameters();
         Self {
             estimator: typed.estimator.unwrap_or(preset.estimator),
-            k_normals: typed.k_normals.unwrap_or(preset.k_normals),
+            k_normals: typed
+                .k_normals
+                .or(typed.estimator.map(Estimator::usual_k))
+                .unwrap_or(preset.k_normals),
             k_graph: typed.k_graph.unwrap_or(preset.k_graph),
             edge_rule: typed.edge_rule.unwrap_or(preset.edge_rule),
             start: typed.start.unwrap_or(preset.start),
@@ -432,7 +435,17 @@ mod tests {
     #[test]
     fn a_preset_gives_what_is_not_typed() {
         for preset in Preset::ALL {
-            let typed = ["normend", "orient", "a.ply", "-o", "b.ply", "--eta", "0.5", "--preset", preset.name()];
+            let typed = [
+                "normend",
+                "orient",
+                "a.ply",
+                "-o",
+                "b.ply",
+                "--eta",
+                "0.5",
+                "--preset",
+                preset.name(),
+            ];
             let Some(Command::Orient(orient)) = Arguments::try_parse_from(typed).unwrap().command else {
                 panic!("not parsed as orient");
             };

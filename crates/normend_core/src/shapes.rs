@@ -6,7 +6,7 @@
 mod benchmark;
 mod bodies;
 mod field;
-mod random;
+pub(crate) mod random;
 mod rays;
 mod scanner;
 mod solid;
@@ -19,7 +19,6 @@ use rayon::prelude::*;
 
 pub use self::benchmark::{BenchmarkCloud, BenchmarkPoints, benchmark_clouds};
 use self::random::Random;
-pub use self::scanner::Station;
 use self::solid::{Cavity, Primitive, Solid};
 
 /// A generated cloud: `n` positions and their exact outward unit normals.

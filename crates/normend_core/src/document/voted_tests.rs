@@ -30,7 +30,12 @@ fn propagation(world: &World, voted: &Signs) -> Propagation {
         splat_radii: Arc::new(vec![1.0; world.n_points]),
         tree: Arc::clone(&world.tree),
         base_regions,
-        default_sources: world.tree.roots().iter().map(|&root| world.tree.order()[root as usize]).collect(),
+        default_sources: world
+            .tree
+            .roots()
+            .iter()
+            .map(|&root| world.tree.order()[root as usize])
+            .collect(),
         voted_sources: Arc::new(voted.iter().map(source).collect()),
         patches: None,
         seconds: Vec::new(),
@@ -135,7 +140,10 @@ fn a_click_in_a_voted_region_mends_a_part_of_it() {
     let change = document.apply(Edit::Mend(4)).unwrap();
     assert_eq!(document.sources().len(), 1);
     let turned = |document: &Document, point| document.oriented_normal(point).unwrap().z < 0.0;
-    assert_eq!([0, 1, 2, 3, 4, 5].map(|point| turned(&document, point)), [false, false, false, true, true, true]);
+    assert_eq!(
+        [0, 1, 2, 3, 4, 5].map(|point| turned(&document, point)),
+        [false, false, false, true, true, true]
+    );
     assert_eq!(change.n_points(), 3);
 
     // All of a voted region turns by a source at the voted point; without it the vote holds again.

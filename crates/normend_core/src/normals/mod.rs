@@ -6,6 +6,7 @@
 pub(crate) mod eigen;
 mod obne;
 mod pca;
+mod rrht;
 mod wpca;
 
 use glam::{DVec3, Vec3};
@@ -13,6 +14,7 @@ use rayon::prelude::*;
 
 pub use obne::obne;
 pub use pca::pca;
+pub use rrht::rrht;
 pub use wpca::wpca;
 
 use crate::progress::{Part, Steps};
@@ -25,6 +27,8 @@ pub enum Estimator {
     Pca,
     /// PCA with weights that fall with distance (Liu et al. eq. 1).
     Wpca,
+    /// Robust randomized Hough transform, which keeps sharp edges (Boulch and Marlet 2012).
+    Rrht,
     /// Orientation-benefit normal estimation (Liu et al. eq. 2–4).
     #[default]
     Obne,
@@ -32,13 +36,14 @@ pub enum Estimator {
 
 impl Estimator {
     /// All estimators, in the order of menus.
-    pub const ALL: [Self; 3] = [Self::Pca, Self::Wpca, Self::Obne];
+    pub const ALL: [Self; 4] = [Self::Pca, Self::Wpca, Self::Rrht, Self::Obne];
 
     /// The name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Pca => "pca",
             Self::Wpca => "wpca",
+            Self::Rrht => "rrht",
             Self::Obne => "obne",
         }
     }
@@ -48,7 +53,19 @@ impl Estimator {
         match self {
             Self::Pca => "PCA",
             Self::Wpca => "WPCA",
+            Self::Rrht => "RRHT",
             Self::Obne => "OBNE",
+        }
+    }
+
+    /// Neighbors that a normal is usually fitted to.
+    ///
+    /// A plane is fitted best to the nearest few. The Hough transform lives on many different triples, of which 12 neighbors have
+    /// 286 and half of those across an edge when it is near; Boulch and Marlet take 100 to 500.
+    pub fn usual_k(self) -> usize {
+        match self {
+            Self::Pca | Self::Wpca | Self::Obne => 12,
+            Self::Rrht => 64,
         }
     }
 }
@@ -70,6 +87,7 @@ pub fn estimate(
     match estimator {
         Estimator::Pca => pca(cloud, neighbors, k, progress),
         Estimator::Wpca => wpca(cloud, neighbors, k, progress),
+        Estimator::Rrht => rrht(cloud, neighbors, k, progress),
         Estimator::Obne => {
             let initial = wpca(cloud, neighbors, k, &Part::new(progress, 0.0..0.35))?;
             obne(cloud, neighbors, k, &initial, &Part::new(progress, 0.35..1.0))

@@ -18,14 +18,17 @@ pub fn pca(
     k: usize,
     progress: &dyn Progress,
 ) -> Result<Vec<Vec3>, Cancelled> {
-    for_each_neighborhood(cloud, neighbors, k, progress, |_, offsets| {
-        // The point itself has offset zero.
-        let mean = offsets.iter().sum::<DVec3>() / (offsets.len() + 1) as f64;
-        let mut scatter = Symmetric3::default();
-        scatter.add_outer(1.0, mean);
-        for &offset in offsets {
-            scatter.add_outer(1.0, offset - mean);
-        }
-        scatter.eigen().vectors[0].as_vec3()
-    })
+    for_each_neighborhood(cloud, neighbors, k, progress, |_, offsets| fit(offsets).as_vec3())
+}
+
+/// The normal of the plane of least squared distance to a point and its neighbors at `offsets`.
+pub(super) fn fit(offsets: &[DVec3]) -> DVec3 {
+    // The point itself has offset zero.
+    let mean = offsets.iter().sum::<DVec3>() / (offsets.len() + 1) as f64;
+    let mut scatter = Symmetric3::default();
+    scatter.add_outer(1.0, mean);
+    for &offset in offsets {
+        scatter.add_outer(1.0, offset - mean);
+    }
+    scatter.eigen().vectors[0]
 }

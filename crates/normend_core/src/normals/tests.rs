@@ -23,7 +23,9 @@ fn a_plane_has_its_normal() {
         .collect();
     for estimator in Estimator::ALL {
         for found in estimate_all(&positions, 8, estimator) {
-            assert!(angle(found, normal) < 1e-5, "{}", estimator.name());
+            // A few triples, some of them narrow, do not average the rounding of positions as all neighbors do.
+            let tolerance = if estimator == Estimator::Rrht { 1e-4 } else { 1e-5 };
+            assert!(angle(found, normal) < tolerance, "{} {}", estimator.name(), angle(found, normal));
         }
     }
 }
@@ -174,4 +176,25 @@ fn does_not_depend_on_threads() {
         };
         assert_eq!(with_threads(1), with_threads(4));
     }
+}
+
+#[test]
+fn rrht_keeps_an_edge_that_pca_rounds() {
+    // Two faces of a roof at 90°, far from their ends.
+    let face = |u: f32, v: f32, side: f32| Vec3::new(v, u * side, -u);
+    let positions: Vec<Vec3> = (0..1600)
+        .flat_map(|i| {
+            let (u, v) = ((i % 20) as f32 + 0.5, (i / 20) as f32 + 0.01 * (i % 7) as f32);
+            [face(u, v, 1.0), face(u, v, -1.0)]
+        })
+        .collect();
+    let worst = |estimator: Estimator, k| {
+        let normals = estimate_all(&positions, k, estimator);
+        let near_edge = (0..positions.len()).filter(|&i| positions[i].z > -3.0 && (10.0..60.0).contains(&positions[i].x));
+        near_edge
+            .map(|i| angle(normals[i], Vec3::new(0.0, if positions[i].y > 0.0 { 1.0 } else { -1.0 }, 1.0)))
+            .fold(0.0, f32::max)
+    };
+    assert!(worst(Estimator::Pca, 24) > 0.3, "{}", worst(Estimator::Pca, 24));
+    assert!(worst(Estimator::Rrht, 24) < 0.1, "{}", worst(Estimator::Rrht, 24));
 }
