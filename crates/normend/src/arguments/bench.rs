@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::CommonArguments;
+use super::{CommonArguments, PropagationArguments};
 
 /// `normend bench`.
 #[derive(Debug, Args)]
@@ -19,6 +19,12 @@ pub struct BenchArguments {
 pub enum BenchCommand {
     /// Write the generated clouds that methods are compared on
     Clouds(CloudsArguments),
+    /// Count the normals that come out wrong, class by class
+    Quality(QualityArguments),
+    /// Count the clicks of a simulated user until no wrong region is left
+    Clicks(ClicksArguments),
+    /// Make the figures of the paper as tables
+    Paper(PaperArguments),
 }
 
 /// `normend bench clouds`.
@@ -41,6 +47,125 @@ pub struct CloudsArguments {
     pub only: Vec<String>,
 
     /// Allow files that exist to be replaced
+    #[arg(long)]
+    pub overwrite: bool,
+
+    /// What every command takes.
+    #[command(flatten)]
+    pub common: CommonArguments,
+}
+
+/// `normend bench quality`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Each DIR/<class>/<name>.raw.ply is oriented and compared with DIR/<class>/<name>.ply, as `normend check` does; clouds \
+without a truth are left out and counted. `normend bench clouds` writes such a folder.
+
+A row has the number of clouds; mean, median and worst share of wrong normals; how many clouds have no wrong normal (at \
+0), and no 10 or more connected ones (no region), in the graph of 10 nearest neighbors; the mean angle between the \
+normals' lines in degrees; the seconds of all its clouds. Nothing may be flipped, save a whole cloud of the class open. \
+Scans of rooms (scan/room…) are a row by themselves.
+
+As many clouds as threads are worked on at once, each on one thread; counts do not depend on it, and with --threads 1 \
+nothing else disturbs the seconds.
+
+Examples:
+  normend bench quality generated/
+  normend bench quality generated/ --only noise --clouds --estimator pca
+  normend bench quality generated/ --json - | jq .all.mean_wrong_share")]
+pub struct QualityArguments {
+    /// Folder of classes of clouds
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+
+    /// How signs are found.
+    #[command(flatten)]
+    pub propagation: PropagationArguments,
+
+    /// Only the clouds of this name or class; can be given several times
+    #[arg(long, value_name = "NAME")]
+    pub only: Vec<String>,
+
+    /// A row for each cloud too
+    #[arg(long)]
+    pub clouds: bool,
+
+    /// Write all numbers as JSON to FILE, or to standard output (-) in place of the table
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+
+    /// Allow the report to replace a file that exists
+    #[arg(long)]
+    pub overwrite: bool,
+
+    /// What every command takes.
+    #[command(flatten)]
+    pub common: CommonArguments,
+}
+
+/// `normend bench clicks`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Each DIR/<class>/<name>.raw.ply is oriented; then a user who knows DIR/<class>/<name>.ply clicks the middle of the largest \
+wrong region, until none of 10 or more connected points is left, or 60 times. Wholes of the class open, and scans of rooms \
+(scan/room…), may be flipped before the first click.
+
+A row for each kind of user: tree mends along the tree, default takes the patch that is offered first, wheel turns the \
+wheel to the patch that mends most. Where there are no patches, all mend along the tree. Over the clouds that had a wrong \
+region, it has the mean and median of clicks, the mean of steps of the wheel, the share of harmful clicks (more points are \
+wrong than before), the points that a click turns, on how many clouds the user gave up, and how long a preview with its \
+click takes.
+
+Examples:
+  normend bench clicks generated/
+  normend bench clicks generated/ --only close_sheets --clouds")]
+pub struct ClicksArguments {
+    /// Folder of classes of clouds
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+
+    /// How signs are found.
+    #[command(flatten)]
+    pub propagation: PropagationArguments,
+
+    /// Only the clouds of this name or class; can be given several times
+    #[arg(long, value_name = "NAME")]
+    pub only: Vec<String>,
+
+    /// Rows for each cloud that had a wrong region too
+    #[arg(long)]
+    pub clouds: bool,
+
+    /// What every command takes.
+    #[command(flatten)]
+    pub common: CommonArguments,
+}
+
+/// `normend bench paper`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Tables in Markdown after the figures of Liu et al., *Mendable Consistent Orientation of Point Clouds*, over the clouds \
+DIR/<class>/<name>.raw.ply with their truth <name>.ply: number and purity of sources against eta (Fig. 5), normal \
+estimators (Fig. 6), noise on a generated octahedron (Fig. 12), sorted shares of wrong normals (Fig. 14), and the time of \
+each stage.
+
+Examples:
+  normend bench paper generated/ -o paper.md
+  normend bench paper given/ generated/ --only sharp")]
+pub struct PaperArguments {
+    /// Folders of classes of clouds
+    #[arg(required = true, value_name = "DIR")]
+    pub folders: Vec<PathBuf>,
+
+    /// Only the clouds of this name or class; can be given several times
+    #[arg(long, value_name = "NAME")]
+    pub only: Vec<String>,
+
+    /// File to write, in place of standard output
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+
+    /// Allow the output to replace a file that exists
     #[arg(long)]
     pub overwrite: bool,
 

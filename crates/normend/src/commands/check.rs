@@ -46,7 +46,7 @@ pub fn run(arguments: &CheckArguments) -> anyhow::Result<Outcome> {
     let reference_normals = normals_of(&reference, &arguments.reference)?;
     let result = normend_io::read(&arguments.result, &Part::new(&bar, 0.2..0.4))?;
     let result_normals = normals_of(&result, &arguments.result)?;
-    check_same_points(&reference, &result, arguments)?;
+    check_same_points(&reference, &arguments.reference, &result, &arguments.result)?;
     bar.stage("Comparing normals");
     let comparison = compare(
         &reference.cloud,
@@ -67,7 +67,11 @@ pub fn run(arguments: &CheckArguments) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn normals_of(scan: &Scan, path: &Path) -> anyhow::Result<Arc<Vec<Vec3>>> {
+/// The normals of a file.
+///
+/// # Errors
+/// A file without.
+pub(super) fn normals_of(scan: &Scan, path: &Path) -> anyhow::Result<Arc<Vec<Vec3>>> {
     scan.given_normals.clone().with_context(|| {
         format!(
             "{} has no normals (no nx ny nz): orient it first, or name another file",
@@ -77,14 +81,22 @@ fn normals_of(scan: &Scan, path: &Path) -> anyhow::Result<Arc<Vec<Vec3>>> {
 }
 
 /// Refuses files of other points, or of the same points in another order: counts would mean nothing.
-fn check_same_points(reference: &Scan, result: &Scan, arguments: &CheckArguments) -> anyhow::Result<()> {
+///
+/// # Errors
+/// In words, with the names of both files.
+pub(super) fn check_same_points(
+    reference: &Scan,
+    reference_path: &Path,
+    result: &Scan,
+    result_path: &Path,
+) -> anyhow::Result<()> {
     let (truth, cloud) = (&reference.cloud, &result.cloud);
     if truth.n_points() != cloud.n_points() {
         bail!(
-            "{} has {} and {} has {}: check needs the same points in the same order",
-            arguments.result.display(),
+            "{} has {} and {} has {}: both must hold the same points in the same order",
+            result_path.display(),
             counted(cloud.n_points(), "point"),
-            arguments.reference.display(),
+            reference_path.display(),
             counted(truth.n_points(), "point")
         );
     }
@@ -96,9 +108,9 @@ fn check_same_points(reference: &Scan, result: &Scan, arguments: &CheckArguments
         // Not `shift > max_shift`: a shift that is not a number must not pass.
         if shift.is_nan() || shift > max_shift {
             bail!(
-                "point {point} of {} is {shift:.3e} away from point {point} of {}: check needs the same points in the same order",
-                arguments.result.display(),
-                arguments.reference.display()
+                "point {point} of {} is {shift:.3e} away from point {point} of {}: both must hold the same points in the same order",
+                result_path.display(),
+                reference_path.display()
             );
         }
     }

@@ -68,7 +68,8 @@ impl Serialize for Seconds {
     }
 }
 
-fn serialize_parameters<S: Serializer>(parameters: &Parameters, serializer: S) -> Result<S::Ok, S::Error> {
+/// Parameters in a report, under the names of their flags.
+pub(super) fn serialize_parameters<S: Serializer>(parameters: &Parameters, serializer: S) -> Result<S::Ok, S::Error> {
     /// The parameters under the names of their flags.
     #[derive(Serialize)]
     struct Named {
@@ -218,7 +219,7 @@ fn ends_with_separator(path: &Path) -> bool {
 }
 
 /// Standard output for `-`, else a new file; opened before the work, so that a wrong path costs no time.
-fn open_report(path: &Path, overwrite: bool) -> anyhow::Result<Box<dyn Write>> {
+pub(super) fn open_report(path: &Path, overwrite: bool) -> anyhow::Result<Box<dyn Write>> {
     if path == Path::new("-") {
         return Ok(Box::new(io::stdout()));
     }

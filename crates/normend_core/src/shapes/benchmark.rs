@@ -6,7 +6,8 @@ use super::Shape;
 use super::bodies::*;
 use super::random::Random;
 use super::rays::{Body, Density, Sample, Spread};
-use super::scanner::{self, Errors, Station, Stations};
+use super::scanner::{self, Errors, Stations};
+use crate::evidence::Station;
 use crate::{Cancelled, Neighbors, PointCloud, Progress};
 
 /// A cloud of the benchmark set: a recipe, and the same points every time.
@@ -223,29 +224,29 @@ pub fn benchmark_clouds() -> Vec<BenchmarkCloud> {
         sheets("book_16_tight", || book(16, 4.2, 0.18, 0.026), 40_000, Poisson),
         sheets("impeller_7", || impeller(7, 0.02, 1.1, 0.9, false), 30_000, Poisson),
         sheets("turbine_12", || impeller(12, 0.025, 1.4, 0.0, true), 36_000, Random),
-        sheets("heat_sink_9", || heat_sink(4, 0.16, 0.03), 30_000, Poisson),
+        sheets("heat_sink_9", || heat_sink(4, 0.16, 0.045), 30_000, Poisson),
         sheets("heat_sink_13", || heat_sink(6, 0.12, 0.032), 36_000, Lattice),
         sheets(
             "plate_stack",
-            || plate_stack([0.03, 0.04, 0.05, 0.06, 0.08], 0.03),
+            || plate_stack([0.03, 0.04, 0.05, 0.06, 0.08], 0.05),
             24_000,
             Poisson,
         ),
         sheets(
             "nested_tubes",
-            || nested_tubes([0.3, 0.42, 0.52, 0.6], 0.035),
+            || nested_tubes([0.3, 0.44, 0.56, 0.66], 0.055),
             32_000,
             Poisson,
         ),
         sheets(
             "nested_shells",
-            || nested_shells([0.95, 0.85, 0.6], 0.04),
+            || nested_shells([0.95, 0.82, 0.55], 0.06),
             34_000,
             Random,
         ),
-        sheets("rolled_sheet", || rolled_sheet(0.11, 4.5, 0.04), 30_000, Poisson),
+        sheets("rolled_sheet", || rolled_sheet(0.11, 4.5, 0.05), 30_000, Poisson),
         sheets("crossing_plates_4", || crossing_plates(4, 0.035), 26_000, Random),
-        sheets("mug", || mug(0.035), 14_000, Poisson),
+        sheets("mug", || mug(0.05), 14_000, Poisson),
         sheets("plant", || plant(6, 0.025), 14_000, Poisson),
         sheets("gear_pair", || gear_pair(13), 18_000, Poisson),
         genus("frame_2", || frame(2, 0.09), 16_000, Poisson),

@@ -1,7 +1,6 @@
 //! A simulated laser scanner: rays from stations, with the errors that real ones have.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use std::ops::Range;
 
 use glam::{DQuat, DVec3, dvec3};
 use rayon::prelude::*;
@@ -9,15 +8,7 @@ use rayon::prelude::*;
 use super::field::normal;
 use super::random::Random;
 use super::rays::{Body, Sample, trace};
-
-/// Points that a scanner saw from one place.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Station {
-    /// The points it saw, by id.
-    pub points: Range<usize>,
-    /// Where it stood, in the unit and coordinates of the points.
-    pub position: DVec3,
-}
+use crate::evidence::Station;
 
 /// Where the stations of a scan are.
 #[derive(Clone, Copy, Debug)]
@@ -111,7 +102,7 @@ pub(super) fn scan(
                 .map(|(point, normal)| (turn * point + shift, normal)),
         );
         list.push(Station {
-            points: first..samples.len(),
+            points: first as u32..samples.len() as u32,
             position,
         });
     }

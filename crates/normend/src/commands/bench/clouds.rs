@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use normend_core::Progress;
+use normend_core::evidence::Station;
 use normend_core::progress::Part;
-use normend_core::shapes::{BenchmarkCloud, BenchmarkPoints, Station, benchmark_clouds};
+use normend_core::shapes::{BenchmarkCloud, BenchmarkPoints, benchmark_clouds};
 use normend_io::{Positions, write_points};
 
 use super::super::{Outcome, check_may_write, prepare, title_of, wrong_use};

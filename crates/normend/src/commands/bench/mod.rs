@@ -1,6 +1,10 @@
 //! `normend bench`: how right and how fast the methods are.
 
+mod clicks;
 mod clouds;
+mod folder;
+mod paper;
+mod quality;
 
 use super::Outcome;
 use crate::arguments::bench::{BenchArguments, BenchCommand};
@@ -12,5 +16,8 @@ use crate::arguments::bench::{BenchArguments, BenchCommand};
 pub fn run(arguments: &BenchArguments) -> anyhow::Result<Outcome> {
     match &arguments.command {
         BenchCommand::Clouds(arguments) => clouds::run(arguments),
+        BenchCommand::Quality(arguments) => quality::run(arguments),
+        BenchCommand::Paper(arguments) => paper::run(arguments),
+        BenchCommand::Clicks(arguments) => clicks::run(arguments),
     }
 }
