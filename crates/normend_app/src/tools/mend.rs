@@ -271,18 +271,7 @@ impl MendTool {
             Some(Target::Point { point, .. }) if self.quiet.is_none() => Some(point),
             _ => None,
         };
-        // What was chosen for another place or another state of the document is over.
-        let holds = |&(patch, chosen_at): &(Patch, u64)| {
-            chosen_at == revision && point.is_none_or(|point| is_in(document, patch, point))
-        };
-        self.chosen = self.chosen.filter(holds);
-        if let Some(point) = point
-            && self.steps != 0
-            && let Some(aimed) = self.aim(document, point, Means::Patch).patch
-        {
-            self.chosen = Some((aimed.patch, revision));
-            self.steps = 0;
-        }
+        self.choose(document, point);
         let wanted = point.map(|point| Previewed {
             point,
             means,
@@ -303,6 +292,23 @@ impl MendTool {
             Some(Preview { of, aim, change })
         });
         scene.highlight(self.preview.as_ref().map(|preview| &preview.change));
+    }
+
+    /// Takes the steps that were asked for, from where the pointer is, and forgets a choice that was made for another place
+    /// or another state of the document.
+    fn choose(&mut self, document: &Document, point: Option<u32>) {
+        let revision = document.revision();
+        let holds = |&(patch, chosen_at): &(Patch, u64)| {
+            chosen_at == revision && point.is_none_or(|point| is_in(document, patch, point))
+        };
+        self.chosen = self.chosen.filter(holds);
+        if let Some(point) = point
+            && self.steps != 0
+            && let Some(aimed) = self.aim(document, point, Means::Patch).patch
+        {
+            self.chosen = Some((aimed.patch, revision));
+            self.steps = 0;
+        }
     }
 
     /// What a click on a point does.
@@ -371,4 +377,101 @@ fn is_in(document: &Document, patch: Patch, point: u32) -> bool {
         .propagation()
         .and_then(|propagation| propagation.patches.as_ref());
     patches.is_some_and(|patches| patch.leaves().contains(&patches.leaf(point)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::{DVec3, Vec3};
+    use normend_core::patches::{Level, Patches};
+    use normend_core::{Parameters, PointCloud, Propagation, Regions, RiemannianGraph, Silent, SpanningTree};
+
+    use super::*;
+
+    /// Sixteen points in a row, all normals up, in patches of 1, 2, 4, 8 and all; those of four have the weakest boundary.
+    fn row() -> Document {
+        let edges: Vec<_> = (0..15).map(|a| (a, a + 1, 0.1, false)).collect();
+        let tree = SpanningTree::new(&RiemannianGraph::from_edges(16, &edges), &Silent).unwrap();
+        let tree = Arc::new(tree);
+        let halves = |n: u32| -> Vec<u32> { (0..n).map(|cluster| cluster / 2).collect() };
+        let parents = [halves(16), halves(8), halves(4), halves(2)];
+        let strengths = [vec![0.9; 16], vec![0.5; 8], vec![0.1; 4], vec![0.3; 2]];
+        let levels: Vec<_> = parents
+            .iter()
+            .zip(&strengths)
+            .map(|(parents, strengths)| Level { parents, strengths })
+            .collect();
+        let positions = (0..16).map(|point| Vec3::X * point as f32).collect();
+        let cloud = PointCloud::new(DVec3::ZERO, positions).unwrap();
+        let mut document = Document::new(Arc::new(cloud), None);
+        document.install(Propagation {
+            parameters: Parameters::default(),
+            normals: Arc::new(vec![Vec3::Z; 16]),
+            splat_radii: Arc::new(vec![1.0; 16]),
+            base_regions: Regions::new(Arc::clone(&tree), Default::default(), Default::default()),
+            default_sources: vec![0],
+            voted_sources: Arc::default(),
+            patches: Some(Arc::new(Patches::new(&tree, &levels))),
+            tree,
+            seconds: Vec::new(),
+        });
+        document
+    }
+
+    fn n_aimed(tool: &MendTool, document: &Document, point: u32) -> Option<u32> {
+        tool.aim(document, point, Means::Patch)
+            .patch
+            .map(|aimed| aimed.patch.n_points)
+    }
+
+    #[test]
+    fn modifiers_say_which_region_is_meant() {
+        let (tool, document) = (MendTool::default(), row());
+        let edit = |modifiers| tool.aim(&document, 5, Means::of(modifiers)).edit;
+        assert_eq!(edit(Modifiers::NONE), Edit::TurnPatch { point: 5, n_points: 4 });
+        assert_eq!(edit(Modifiers::ALT), Edit::Mend(5));
+        assert_eq!(edit(Modifiers::COMMAND), Edit::TurnWhole(5));
+        assert_eq!(
+            tool.aim(&document, 5, Means::Tree).preview(&document),
+            document.preview_mend(5).ok()
+        );
+        let aim = tool.aim(&document, 5, Means::Patch);
+        assert_eq!(aim.preview(&document).unwrap().n_points(), 4);
+        assert_eq!(aim.patch.unwrap().level, (3, 5));
+    }
+
+    #[test]
+    fn steps_choose_patches_within_what_is_offered() {
+        let (mut tool, document) = (MendTool::default(), row());
+        for (step, expect) in [(1, 8), (1, 16), (1, 16), (-1, 8), (-2, 2), (-5, 1), (3, 8)] {
+            tool.step(step);
+            tool.choose(&document, Some(5));
+            assert_eq!(n_aimed(&tool, &document, 5), Some(expect), "{step}");
+        }
+    }
+
+    #[test]
+    fn a_choice_holds_on_its_patch_and_until_an_edit() {
+        let (mut tool, mut document) = (MendTool::default(), row());
+        tool.step(1);
+        tool.choose(&document, None);
+        assert_eq!(n_aimed(&tool, &document, 5), Some(8), "a step waits for a place");
+        tool.choose(&document, Some(5));
+        tool.choose(&document, Some(0));
+        assert_eq!(n_aimed(&tool, &document, 0), Some(8));
+        tool.choose(&document, Some(9));
+        assert_eq!(n_aimed(&tool, &document, 9), Some(4));
+        tool.choose(&document, Some(0));
+        assert_eq!(n_aimed(&tool, &document, 0), Some(4), "what was left is forgotten");
+
+        tool.step(-1);
+        tool.choose(&document, Some(0));
+        assert_eq!(n_aimed(&tool, &document, 0), Some(2));
+        document.apply(tool.aim(&document, 0, Means::Patch).edit).unwrap();
+        tool.choose(&document, Some(1));
+        assert_eq!(n_aimed(&tool, &document, 1), Some(1), "point 0 is vouched for");
+        assert_eq!(tool.aim(&document, 0, Means::Patch).edit, Edit::Mend(0));
+        assert_eq!(n_aimed(&tool, &document, 2), Some(2));
+    }
 }
