@@ -33,6 +33,8 @@ pub mod regions;
 
 pub mod evidence;
 
+pub mod side_rule;
+
 pub mod propagation;
 
 pub mod document;
@@ -51,5 +53,6 @@ pub use progress::{Cancelled, Progress, Silent};
 pub use propagation::{Parameters, Preset, Propagation, SourceRule, Stage, Start};
 pub use regions::Regions;
 pub use riemannian_graph::{EdgeRule, RiemannianGraph};
+pub use side_rule::SideRule;
 pub use sources::{Source, Sources};
 pub use spanning_tree::SpanningTree;

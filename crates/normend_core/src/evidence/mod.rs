@@ -9,11 +9,13 @@
 mod depth_buffer;
 mod frame;
 mod given;
+mod inside_views;
 mod outside_views;
 mod scanner;
 mod scene;
 
 pub use given::given;
+pub use inside_views::inside_views;
 pub use outside_views::{N_VIEWS, outside_views};
 pub use scanner::{Station, scanner};
 
@@ -26,6 +28,8 @@ pub const UNIT: i32 = 4096;
 pub enum Origin {
     /// Seen from outside of the cloud, where nothing of the cloud is in front of it.
     OutsideViews,
+    /// Seen from places within the cloud, as rooms are.
+    InsideViews,
     /// Measured by a scanner whose place is known.
     Scanner,
     /// A normal that came with the file.
@@ -34,12 +38,13 @@ pub enum Origin {
 
 impl Origin {
     /// All origins, in the order of lists.
-    pub const ALL: [Self; 3] = [Self::OutsideViews, Self::Scanner, Self::Given];
+    pub const ALL: [Self; 4] = [Self::OutsideViews, Self::InsideViews, Self::Scanner, Self::Given];
 
     /// The name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::OutsideViews => "outside-views",
+            Self::InsideViews => "inside-views",
             Self::Scanner => "scanner",
             Self::Given => "given",
         }
@@ -70,6 +75,12 @@ impl Vote {
     /// How far the looks agree that the stored normal points to the seen side: `signed / max(weight, 1)`, in −1..=1.
     pub fn pull(self) -> f32 {
         self.signed as f32 / self.weight.max(UNIT) as f32
+    }
+
+    /// [`Self::pull`] as a whole number of 1/[`UNIT`], for sums.
+    pub fn pull_in_units(self) -> i32 {
+        // At most UNIT, as the weight is at least as large as the signed sum.
+        (i64::from(self.signed) * i64::from(UNIT) / i64::from(self.weight.max(UNIT))) as i32
     }
 }
 

@@ -19,7 +19,7 @@ pub struct Station {
 
 /// Cosine of the angle between normal and ray, 60°, from which on a scanner's vote is a whole one. Fitted normals near edges
 /// and in noise are off by up to about 30°, so rays more grazing than 60° may come to the wrong side of one.
-const SURE_COSINE: f64 = 0.5;
+pub(super) const SURE_COSINE: f64 = 0.5;
 
 /// How many looks a scanner's vote is worth: about as many as a point gets from all views that see it from outside, each of
 /// which may err, while the scanner did see the point.

@@ -1,6 +1,5 @@
 //! The points as discs in the frame of their principal axes, and who of many views sees which.
 
-use std::f32::consts::PI;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{Mat3, Vec3};
@@ -8,7 +7,6 @@ use rayon::prelude::*;
 
 use super::depth_buffer::{DepthBuffer, Disc};
 use super::frame::Frame;
-use super::{UNIT, Vote};
 use crate::progress::Steps;
 use crate::{Cancelled, PointCloud, Progress};
 
@@ -26,12 +24,6 @@ const DISC: f32 = 1.2;
 /// How far below the surface in front a point still is on it, in its own spacings. More looks through sheets as near as that,
 /// less takes noise for surfaces.
 const TOLERANCE: f32 = 0.6;
-
-/// The angle between normal and line of sight that a look fades with, radians: `exp(−(angle / 30°)²)`.
-const FADE: f32 = PI / 6.0;
-
-/// Cosine of the angle from which on a look is not taken: at 66° it weighs less than a hundredth.
-const LEAST_COSINE: f32 = 0.4;
 
 /// Cosine of the angle from which on a disc hides nothing: edges of thin sheets are no surface.
 const LEAST_DRAWN: f32 = 0.1;
@@ -78,6 +70,8 @@ struct Seen {
 pub(super) struct Picture<P> {
     pub width: usize,
     pub height: usize,
+    /// Cosine between normal and line of sight below which a look is not taken.
+    pub least_cosine: f32,
     /// The disc of a splat and the cosine between its normal and the line of sight, of any sign; `None` where the picture
     /// does not show it.
     pub project: P,
@@ -212,7 +206,7 @@ impl Look<'_> {
         for (word, splats) in self.scene.splats.chunks(64).enumerate() {
             for (bit, splat) in splats.iter().enumerate() {
                 if let Some((disc, cosine)) = (picture.project)(splat)
-                    && cosine.abs() > LEAST_COSINE
+                    && cosine.abs() > picture.least_cosine
                     && in_picture(&disc)
                 {
                     let (front, behind) = self.buffer.sees(&disc);
@@ -221,29 +215,6 @@ impl Look<'_> {
                 }
             }
         }
-    }
-}
-
-/// The weights of looks by cosine, in steps fine enough that rounding moves none by more than a few thousandths.
-pub(super) struct Weights(Vec<i32>);
-
-impl Weights {
-    const STEPS: f32 = 1024.0;
-
-    pub fn new() -> Self {
-        let weight = |cosine: f32| ((-(cosine.acos() / FADE).powi(2)).exp() * UNIT as f32).round() as i32;
-        Self(
-            (0..=Self::STEPS as usize)
-                .map(|step| weight(step as f32 / Self::STEPS))
-                .collect(),
-        )
-    }
-
-    /// Casts into `vote` a look whose line of sight, towards the viewer, has this cosine with the stored normal.
-    #[inline]
-    pub fn cast(&self, vote: &mut Vote, cosine: f32) {
-        let weight = self.0[(cosine.abs().min(1.0) * Self::STEPS + 0.5) as usize];
-        vote.cast(if cosine > 0.0 { weight } else { -weight });
     }
 }
 
