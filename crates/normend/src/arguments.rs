@@ -10,7 +10,7 @@ use clap::error::{ContextKind, ErrorKind};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use normend_core::propagation::{ETA, VIEWS};
 use normend_core::shapes::ShapeKind;
-use normend_core::{EdgeRule, Estimator, Parameters, Preset, SourceRule, Start};
+use normend_core::{EdgeRule, Estimator, Parameters, Preset, SideRule, SourceRule, Start};
 use normend_render::{DisplayMode, StandardView};
 
 use self::bench::BenchArguments;
@@ -158,6 +158,10 @@ pub struct PropagationArguments {
     /// How far from the ends of the votes sources are taken: in votes, or as a share for mended ones
     #[arg(long, value_name = "X", value_parser = eta)]
     pub eta: Option<f32>,
+
+    /// Which side is the right one: outside of objects, the scanner's, the upper one, inside of rooms, that of given normals
+    #[arg(long, value_name = "NAME", value_parser = one_of(&SideRule::ALL, SideRule::name), default_value = SideRule::default().name())]
+    pub rule: SideRule,
 }
 
 impl From<PropagationArguments> for Parameters {
@@ -175,6 +179,7 @@ impl From<PropagationArguments> for Parameters {
             sources: typed.sources.unwrap_or(preset.sources),
             views: typed.views.unwrap_or(preset.views),
             eta: typed.eta.unwrap_or(preset.eta),
+            rule: typed.rule,
         }
     }
 }

@@ -17,7 +17,7 @@ pub use self::preset::Preset;
 pub use self::source_rule::{ETA, SourceRule, VIEWS};
 use crate::progress::Part;
 use crate::{
-    Cancelled, EdgeRule, Estimator, Neighbors, Patches, PointCloud, Progress, Regions, RiemannianGraph, Source,
+    Cancelled, EdgeRule, Estimator, Neighbors, Patches, PointCloud, Progress, Regions, RiemannianGraph, SideRule, Source,
     SpanningTree, normals, visibility,
 };
 
@@ -71,6 +71,8 @@ pub struct Parameters {
     pub views: usize,
     /// How far from the ends of the votes sources are taken (Liu et al. §3.4), within [`ETA`].
     pub eta: f32,
+    /// Which side of each component is the right one.
+    pub rule: SideRule,
 }
 
 impl Parameters {
@@ -93,6 +95,7 @@ impl Parameters {
         sources: SourceRule::Highest,
         views: 8,
         eta: 0.07,
+        rule: SideRule::Outward,
     };
 }
 
@@ -119,6 +122,9 @@ pub enum Stage {
 }
 
 impl Stage {
+    /// All stages, in order.
+    pub const ALL: [Self; 5] = [Self::Neighbors, Self::Normals, Self::Sources, Self::Graph, Self::Tree];
+
     /// The name in reports: `neighbors`, `normals`, `sources`, `graph`, `tree`.
     pub fn name(self) -> &'static str {
         match self {

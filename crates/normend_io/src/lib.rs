@@ -22,6 +22,8 @@ mod new_file;
 
 mod save;
 
+mod stations;
+
 use std::ffi::OsStr;
 use std::fmt;
 use std::fs::{self, File};
@@ -35,6 +37,7 @@ use normend_core::{PointCloud, Progress};
 use rayon::prelude::*;
 
 pub use error::{Broken, Place, ReadError, WriteError};
+pub use stations::read_stations;
 
 use crate::new_file::{NewFile, TextStyle, narrowest};
 use crate::ply::PlyLayout;

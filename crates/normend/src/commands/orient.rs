@@ -81,6 +81,7 @@ pub(super) fn serialize_parameters<S: Serializer>(parameters: &Parameters, seria
         sources: &'static str,
         views: usize,
         eta: f32,
+        rule: &'static str,
     }
     let named = Named {
         estimator: parameters.estimator.name(),
@@ -91,6 +92,7 @@ pub(super) fn serialize_parameters<S: Serializer>(parameters: &Parameters, seria
         sources: parameters.sources.name(),
         views: parameters.views,
         eta: parameters.eta,
+        rule: parameters.rule.name(),
     };
     named.serialize(serializer)
 }

@@ -46,11 +46,12 @@ impl Preset {
         }
     }
 
-    /// The preset that stands for `parameters`, whatever they start from; `None` when something was set by hand.
+    /// The preset that stands for `parameters`, whatever they start from and whichever side is right; `None` when something was set by hand.
     pub fn of(parameters: &Parameters) -> Option<Self> {
         Self::ALL.into_iter().find(|preset| {
             let own = Parameters {
                 start: parameters.start,
+                rule: parameters.rule,
                 ..preset.parameters()
             };
             own == *parameters
