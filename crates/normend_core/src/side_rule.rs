@@ -6,8 +6,9 @@
 use glam::{I64Vec3, Vec3};
 use rayon::prelude::*;
 
-use crate::PointCloud;
-use crate::evidence::{Evidence, UNIT};
+use crate::evidence::{self, Evidence, Known, UNIT};
+use crate::progress::Part;
+use crate::{Cancelled, PointCloud, Progress};
 
 /// What the right side of a surface is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,7 +72,7 @@ impl SideRule {
 }
 
 /// What the rules may go by. Each evidence is about `normals`; what is not known is `None`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Clues<'a> {
     /// The points.
     pub cloud: &'a PointCloud,
@@ -80,15 +81,72 @@ pub struct Clues<'a> {
     /// `n` splat radii by point, for areas.
     pub radii: &'a [f32],
     /// Views from outside, for [`SideRule::Outward`].
-    pub outside: Option<&'a Evidence>,
+    pub outside: Option<Evidence>,
     /// Views from inside, for [`SideRule::IntoRoom`], which without them takes the opposite of the views from outside.
-    pub inside: Option<&'a Evidence>,
+    pub inside: Option<Evidence>,
     /// For [`SideRule::TowardScanner`].
-    pub scanner: Option<&'a Evidence>,
+    pub scanner: Option<Evidence>,
     /// For [`SideRule::Given`].
-    pub given: Option<&'a Evidence>,
+    pub given: Option<Evidence>,
     /// The direction of [`SideRule::Up`], of any length.
     pub up: Vec3,
+}
+
+impl<'a> Clues<'a> {
+    /// Nothing but the surface itself; up is +z.
+    pub fn new(cloud: &'a PointCloud, normals: &'a [Vec3], radii: &'a [f32]) -> Self {
+        Self {
+            cloud,
+            normals,
+            radii,
+            outside: None,
+            inside: None,
+            scanner: None,
+            given: None,
+            up: Vec3::Z,
+        }
+    }
+
+    /// Gathers what `rule` and those that it gives way to go by, unless it is there already. The views take most of the time:
+    /// see [`evidence::outside_views`]. Rooms are looked at from the scanner's places, or from [`evidence::inside_places`]
+    /// where these are not known.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when `progress` asks to stop; nothing else.
+    pub fn gather(&mut self, rule: SideRule, known: &Known<'_>, progress: &dyn Progress) -> Result<(), Cancelled> {
+        let Self {
+            cloud, normals, radii, ..
+        } = *self;
+        match rule {
+            SideRule::TowardScanner if self.scanner.is_none() && !known.stations.is_empty() => {
+                self.scanner = Some(evidence::scanner(cloud, normals, known.stations));
+            }
+            SideRule::Given if self.given.is_none() => {
+                self.given = known.given.map(|given| evidence::given(normals, given, 1.0));
+            }
+            SideRule::IntoRoom if self.inside.is_none() => {
+                let places = if known.stations.is_empty() {
+                    evidence::inside_places(cloud)
+                } else {
+                    known.stations.iter().map(|station| station.position).collect()
+                };
+                let part = Part::new(progress, 0.0..0.5);
+                self.inside = Some(evidence::inside_views(cloud, radii, normals, &places, &part)?);
+            }
+            _ => {}
+        }
+        if self.outside.is_none() {
+            let part = Part::new(progress, 0.5..1.0);
+            self.outside = Some(evidence::outside_views(
+                cloud,
+                radii,
+                normals,
+                evidence::N_VIEWS,
+                &part,
+            )?);
+        }
+        Ok(())
+    }
 }
 
 /// The side of a component.
@@ -116,8 +174,8 @@ const LEAST_AGREEMENT: f64 = 0.05;
 ///
 /// The rules of [`SideRule::with_fallback`] are tried in turn. O(points), in parallel.
 pub fn decide_side(points: &[u32], turned: impl Fn(u32) -> bool + Sync, rule: SideRule, clues: &Clues<'_>) -> Side {
-    let votes = |evidence: Option<&Evidence>| {
-        evidence.map_or(Tally::default(), |evidence| {
+    let votes = |evidence: &Option<Evidence>| {
+        evidence.as_ref().map_or(Tally::default(), |evidence| {
             let votes = evidence.votes();
             Tally::over(points, &turned, |point| {
                 let vote = votes[point];
@@ -127,13 +185,13 @@ pub fn decide_side(points: &[u32], turned: impl Fn(u32) -> bool + Sync, rule: Si
     };
     for &rule in rule.with_fallback() {
         let tally = match rule {
-            SideRule::Outward => votes(clues.outside),
-            SideRule::TowardScanner => votes(clues.scanner),
-            SideRule::Given => votes(clues.given),
+            SideRule::Outward => votes(&clues.outside),
+            SideRule::TowardScanner => votes(&clues.scanner),
+            SideRule::Given => votes(&clues.given),
             SideRule::Up => upward(points, &turned, clues),
-            SideRule::IntoRoom => match votes(clues.inside) {
+            SideRule::IntoRoom => match votes(&clues.inside) {
                 clear if clear.is_clear() => clear,
-                _ => votes(clues.outside).opposite(),
+                _ => votes(&clues.outside).opposite(),
             },
         };
         if tally.is_clear() {
@@ -145,7 +203,7 @@ pub fn decide_side(points: &[u32], turned: impl Fn(u32) -> bool + Sync, rule: Si
             };
         }
     }
-    let is_seen = votes(clues.outside).weight > 0;
+    let is_seen = votes(&clues.outside).weight > 0;
     let (up, volume) = (upward(points, &turned, clues), volume(points, &turned, clues));
     let guesses = if is_seen { [up, volume] } else { [volume, up] };
     let guess = guesses.into_iter().find(|guess| guess.signed != 0);
@@ -273,16 +331,7 @@ mod tests {
     fn check(turned: &[u32], rule: SideRule, clues: impl Fn(&mut Clues<'_>), expect: (bool, Option<SideRule>)) -> Side {
         let (positions, normals) = octahedron(Vec3::new(7.0, -3.0, 2.0));
         let cloud = PointCloud::new(DVec3::ZERO, positions).unwrap();
-        let mut known = Clues {
-            cloud: &cloud,
-            normals: &normals,
-            radii: &[0.5; 6],
-            outside: None,
-            inside: None,
-            scanner: None,
-            given: None,
-            up: Vec3::Z,
-        };
+        let mut known = Clues::new(&cloud, &normals, &[0.5; 6]);
         clues(&mut known);
         let side = decide_side(&[0, 1, 2, 3, 4, 5], |point| turned.contains(&point), rule, &known);
         assert_eq!((side.turned, side.rule), expect, "{side:?}");
@@ -297,21 +346,16 @@ mod tests {
         let side = check(
             &[],
             SideRule::Outward,
-            |clues| clues.outside = Some(leak(&votes)),
+            |clues| clues.outside = Some(votes.clone()),
             (false, Some(SideRule::Outward)),
         );
         assert_eq!((side.agreement, side.seen), (0.5, 4.0 / 6.0));
         check(
             ALL,
             SideRule::Outward,
-            |clues| clues.outside = Some(leak(&votes)),
+            |clues| clues.outside = Some(votes.clone()),
             (true, Some(SideRule::Outward)),
         );
-    }
-
-    /// Evidence that lives as long as any clue.
-    fn leak(evidence: &Evidence) -> &'static Evidence {
-        Box::leak(Box::new(evidence.clone()))
     }
 
     #[test]
@@ -335,56 +379,56 @@ mod tests {
         check(
             &[5],
             SideRule::Outward,
-            |clues| clues.outside = Some(leak(&both)),
+            |clues| clues.outside = Some(both.clone()),
             (false, None),
         );
         check(
             &[2],
             SideRule::Outward,
-            |clues| clues.outside = Some(leak(&both)),
+            |clues| clues.outside = Some(both.clone()),
             (true, None),
         );
     }
 
     #[test]
     fn scanner_and_given_give_way_to_outward() {
-        let votes = leak(&evidence(&[(0, 2); 6]));
+        let votes = evidence(&[(0, 2); 6]);
         for rule in [SideRule::TowardScanner, SideRule::Given] {
             check(
                 &[],
                 rule,
-                |clues| clues.outside = Some(votes),
+                |clues| clues.outside = Some(votes.clone()),
                 (true, Some(SideRule::Outward)),
             );
         }
-        let scanner = leak(&evidence(&[(0, 0), (1, 0), (0, 0), (0, 0), (0, 0), (0, 0)]));
+        let scanner = evidence(&[(0, 0), (1, 0), (0, 0), (0, 0), (0, 0), (0, 0)]);
         check(
             &[],
             SideRule::TowardScanner,
-            |clues| (clues.outside, clues.scanner) = (Some(votes), Some(scanner)),
+            |clues| (clues.outside, clues.scanner) = (Some(votes.clone()), Some(scanner.clone())),
             (false, Some(SideRule::TowardScanner)),
         );
         check(
             &[],
             SideRule::Given,
-            |clues| (clues.outside, clues.given) = (Some(votes), Some(scanner)),
+            |clues| (clues.outside, clues.given) = (Some(votes.clone()), Some(scanner.clone())),
             (false, Some(SideRule::Given)),
         );
     }
 
     #[test]
     fn up_is_for_what_is_not_closed() {
-        let votes = leak(&evidence(&[(1, 0); 6]));
+        let votes = evidence(&[(1, 0); 6]);
         check(
             &[],
             SideRule::Up,
-            |clues| clues.outside = Some(votes),
+            |clues| clues.outside = Some(votes.clone()),
             (false, Some(SideRule::Outward)),
         );
         check(
             &[2],
             SideRule::Up,
-            |clues| clues.outside = Some(votes),
+            |clues| clues.outside = Some(votes.clone()),
             (true, Some(SideRule::Up)),
         );
         check(
@@ -397,18 +441,18 @@ mod tests {
 
     #[test]
     fn into_the_room_is_what_inside_sees_or_outside_does_not() {
-        let shell = leak(&evidence(&[(1, 0); 6]));
+        let shell = evidence(&[(1, 0); 6]);
         check(
             &[],
             SideRule::IntoRoom,
-            |clues| clues.outside = Some(shell),
+            |clues| clues.outside = Some(shell.clone()),
             (true, Some(SideRule::IntoRoom)),
         );
-        let inside = leak(&evidence(&[(1, 0), (0, 0), (0, 0), (0, 0), (0, 0), (0, 0)]));
+        let inside = evidence(&[(1, 0), (0, 0), (0, 0), (0, 0), (0, 0), (0, 0)]);
         check(
             &[],
             SideRule::IntoRoom,
-            |clues| (clues.outside, clues.inside) = (Some(shell), Some(inside)),
+            |clues| (clues.outside, clues.inside) = (Some(shell.clone()), Some(inside.clone())),
             (false, Some(SideRule::IntoRoom)),
         );
     }

@@ -9,12 +9,16 @@
 mod depth_buffer;
 mod frame;
 mod given;
+mod inside_places;
 mod inside_views;
 mod outside_views;
 mod scanner;
 mod scene;
 
+use glam::Vec3;
+
 pub use given::given;
+pub use inside_places::inside_places;
 pub use inside_views::inside_views;
 pub use outside_views::{N_VIEWS, outside_views};
 pub use scanner::{Station, scanner};
@@ -22,6 +26,21 @@ pub use scanner::{Station, scanner};
 /// A vote of one: what a single look at a point from straight above weighs. 1/4096 is finer than any weight is known, and
 /// the sum over the points of the largest cloud stays within `i64`.
 pub const UNIT: i32 = 4096;
+
+/// What is known of a cloud besides its positions.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Known<'a> {
+    /// The file's normals by point, of any length, zero or NaN where a point has none.
+    pub given: Option<&'a [Vec3]>,
+    /// Where the scanner stood.
+    pub stations: &'a [Station],
+}
+
+impl<'a> From<Option<&'a [Vec3]>> for Known<'a> {
+    fn from(given: Option<&'a [Vec3]>) -> Self {
+        Self { given, stations: &[] }
+    }
+}
 
 /// Why a point's side is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
