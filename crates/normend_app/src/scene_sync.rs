@@ -62,8 +62,10 @@ pub struct Scene {
     texture: Option<(TextureId, u64)>,
     /// Gives the point of an instance; `None` while instances are points.
     tree: Option<Arc<SpanningTree>>,
-    /// Points of the source spheres, in the renderer's order.
+    /// Points of the source spheres, in the renderer's order: first those of the document, then voted ones.
     source_points: Vec<u32>,
+    /// How many of them are sources of the document.
+    n_own_sources: usize,
     geometry: Option<Geometry>,
     /// Side of the squares of screen pixels that the last picture has one pixel for.
     pixel_side: u32,
@@ -82,6 +84,7 @@ impl Scene {
             texture: None,
             tree: None,
             source_points: Vec::new(),
+            n_own_sources: 0,
             geometry: None,
             pixel_side: 1,
             picture_id: 0,
@@ -150,13 +153,13 @@ impl Scene {
             .set_highlight(&self.state.device, &self.state.queue, ranges);
     }
 
-    /// Shows the sources as spheres: green where they keep the side that was there, pink where they flipped it.
+    /// Shows the sources as spheres: green where they keep the side that was there, pink where they flipped it; and of those that
+    /// were voted for some, evenly picked, so that thousands neither hide the scan nor slow it down.
     pub fn show_sources(&mut self, session: &Session) {
         let positions = session.document.cloud().positions();
         let selected: &BTreeSet<u32> = &session.selected;
-        let (points, spheres): (Vec<u32>, Vec<Sphere>) = session
-            .document
-            .sources()
+        let sources = session.document.sources();
+        let own = sources
             .iter()
             .filter_map(|source| {
                 let color = if session.document.is_flipped(source) {
@@ -173,8 +176,26 @@ impl Scene {
                         selected: selected.contains(&source.point),
                     },
                 ))
-            })
-            .unzip();
+            });
+        let voted = session
+            .document
+            .propagation()
+            .map_or(&[][..], |propagation| propagation.voted_sources.as_slice());
+        let some_voted = voted
+            .iter()
+            .step_by(voted.len().div_ceil(MAX_VOTED_SPHERES).max(1))
+            .filter(|source| !sources.contains(source.point))
+            .filter_map(|source| {
+                let center = *positions.get(source.point as usize)?;
+                let sphere = Sphere {
+                    center,
+                    color: theme::SOURCE_VOTED,
+                    selected: false,
+                };
+                Some((source.point, sphere))
+            });
+        let (points, spheres): (Vec<u32>, Vec<Sphere>) = own.chain(some_voted).unzip();
+        self.n_own_sources = sources.len();
         if points != self.source_points {
             // Spheres cover other pixels now: earlier picks no longer hold.
             self.source_points = points;
@@ -282,10 +303,15 @@ impl Scene {
                 };
                 point.map(|point| Target::Point { point, position })
             }
-            Hit::Sphere { index, point: position } => self
-                .source_points
-                .get(index as usize)
-                .map(|&point| Target::Source { point, position }),
+            Hit::Sphere { index, point: position } => {
+                let &point = self.source_points.get(index as usize)?;
+                // A voted source is not the user's to select: a click on it is a click on its point.
+                Some(if (index as usize) < self.n_own_sources {
+                    Target::Source { point, position }
+                } else {
+                    Target::Point { point, position }
+                })
+            }
         }
     }
 
@@ -294,6 +320,9 @@ impl Scene {
         self.renderer.read_picture(&self.state.device, &self.state.queue)
     }
 }
+
+/// Most spheres of voted sources: enough to see where they are.
+const MAX_VOTED_SPHERES: usize = 500;
 
 /// Uploads points that were just read, for [`Scene::show_points`]. O(n); in any thread.
 ///

@@ -31,6 +31,8 @@ pub const FACT_HEIGHT: f32 = 18.0;
 pub const SOURCE_KEPT: [f32; 3] = [0.18, 0.72, 0.36];
 /// Color of a source that flipped its point.
 pub const SOURCE_FLIPPED: [f32; 3] = [0.93, 0.35, 0.68];
+/// Color of a source that was voted for, which the user had no hand in.
+pub const SOURCE_VOTED: [f32; 3] = [0.86, 0.79, 0.42];
 
 /// The colors of one theme that are not egui's own names.
 struct Colors {

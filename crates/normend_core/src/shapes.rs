@@ -6,6 +6,7 @@
 mod benchmark;
 mod bodies;
 mod field;
+mod octahedron;
 pub(crate) mod random;
 mod rays;
 mod scanner;
@@ -18,6 +19,7 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 pub use self::benchmark::{BenchmarkCloud, BenchmarkPoints, benchmark_clouds};
+pub use self::octahedron::octahedron;
 use self::random::Random;
 use self::solid::{Cavity, Primitive, Solid};
 

@@ -1,7 +1,8 @@
 //! The side panel: the scan, the propagation's parameters, the sources, the view.
 
 use egui::{Button, Color32, ComboBox, DragValue, RichText, Slider, Stroke, StrokeKind, Ui, Vec2};
-use normend_core::{EdgeRule, Estimator, Parameters, Start};
+use normend_core::propagation::{ETA, VIEWS};
+use normend_core::{EdgeRule, Estimator, Parameters, Preset, SourceRule, Start};
 use normend_render::{DisplayMode, Palette};
 
 use super::sources;
@@ -91,8 +92,10 @@ fn propagation(ui: &mut Ui, session: &mut Session, propagating: bool, blocked: O
     let fits = draft.start != Start::Keep || session.n_without_normal > 0;
     theme::rows(ui, "propagation", |ui| {
         start_row(ui, draft, has_normals);
+        preset_row(ui, draft);
         theme::input_row(ui, "Estimator", "How a normal is fitted to its neighbors", |ui| {
             let combo = ComboBox::from_id_salt("estimator").selected_text(draft.estimator.label());
+            let before = draft.estimator;
             let show = |ui: &mut Ui| {
                 combo
                     .show_ui(ui, |ui| {
@@ -103,6 +106,9 @@ fn propagation(ui: &mut Ui, session: &mut Session, propagating: bool, blocked: O
                     .response
             };
             let response = ui.add_enabled_ui(fits, show).inner;
+            if draft.k_normals == before.usual_k() {
+                draft.k_normals = draft.estimator.usual_k();
+            }
             response.on_disabled_hover_text(NOTHING_IS_FITTED)
         });
         theme::input_row(ui, "k for normals", "Neighbors that a normal is fitted to", |ui| {
@@ -125,6 +131,7 @@ fn propagation(ui: &mut Ui, session: &mut Session, propagating: bool, blocked: O
                 })
                 .response
         });
+        source_rows(ui, draft);
     });
     let never_ran = session.document.propagation().is_none() && !propagating;
     let changed = *draft != session.requested;
@@ -184,6 +191,53 @@ fn start_row(ui: &mut Ui, draft: &mut Parameters, has_normals: bool) {
         }
     });
     ui.end_row();
+}
+
+fn preset_row(ui: &mut Ui, draft: &mut Parameters) {
+    theme::input_row(ui, "Preset", "A whole method; what is set below replaces parts of it", |ui| {
+        let present = Preset::of(draft);
+        ComboBox::from_id_salt("preset")
+            .selected_text(present.map_or("Set by hand", Preset::label))
+            .show_ui(ui, |ui| {
+                for each in Preset::ALL {
+                    if ui.selectable_label(present == Some(each), each.label()).clicked() {
+                        *draft = Parameters {
+                            start: draft.start,
+                            ..each.parameters()
+                        };
+                    }
+                }
+            })
+            .response
+    });
+}
+
+/// Who vouches for the first signs, and how many look.
+fn source_rows(ui: &mut Ui, draft: &mut Parameters) {
+    let votes = draft.start == Start::Estimate;
+    theme::input_row(ui, "First sources", "Who says which side is right, before you do", |ui| {
+        let combo = ComboBox::from_id_salt("sources").selected_text(draft.sources.label());
+        let show = |ui: &mut Ui| {
+            combo
+                .show_ui(ui, |ui| {
+                    for each in SourceRule::ALL {
+                        ui.selectable_value(&mut draft.sources, each, each.label());
+                    }
+                })
+                .response
+        };
+        let response = ui.add_enabled_ui(votes, show).inner;
+        response.on_disabled_hover_text("The normals of the file say it")
+    });
+    if votes && draft.sources != SourceRule::Highest {
+        theme::input_row(ui, "Viewpoints", "8 are the corners of the bounding box", |ui| {
+            ui.add(DragValue::new(&mut draft.views).range(VIEWS).speed(0.1))
+        });
+        let meaning = "How far from the surest votes sources are taken: in votes, or as a share for mended ones";
+        theme::input_row(ui, "Eta", meaning, |ui| {
+            ui.add(DragValue::new(&mut draft.eta).range(ETA).speed(0.005).max_decimals(3))
+        });
+    }
 }
 
 fn view(ui: &mut Ui, settings: &mut Settings, mode: &mut DisplayMode, palette: &Palette) {

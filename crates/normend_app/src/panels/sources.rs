@@ -19,6 +19,12 @@ pub fn ui(ui: &mut Ui, session: &mut Session) -> Option<Action> {
     let reveal = session.reveal.take();
     let session = &*session;
     let sources = session.document.sources();
+    let n_voted = session.document.propagation().map_or(0, |propagation| propagation.voted_sources.len());
+    if n_voted > 0 {
+        let voted = theme::counted(n_voted as u64, "source", "sources");
+        ui.label(RichText::new(format!("{voted} voted for by viewpoints")).weak())
+            .on_hover_text("Found by visibility. Those you make overrule them. Some are shown as yellow spheres.");
+    }
     if sources.is_empty() {
         let hint = "None yet. Click a wrong region in the view: it turns, and its point becomes a source.";
         ui.add(egui::Label::new(RichText::new(hint).weak()).wrap());

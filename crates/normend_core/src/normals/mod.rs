@@ -61,11 +61,12 @@ impl Estimator {
     /// Neighbors that a normal is usually fitted to.
     ///
     /// A plane is fitted best to the nearest few. The Hough transform lives on many different triples, of which 12 neighbors have
-    /// 286 and half of those across an edge when it is near; Boulch and Marlet take 100 to 500.
+    /// 286 and 24 have 2300. Boulch and Marlet take 100 to 500 on dense scans; on the clouds here, where thin parts are few spacings
+    /// wide, normals got worse from there on (mean angle on sharp clouds 4.2° with 24, 6.8° with 64, 8.5° with 100).
     pub fn usual_k(self) -> usize {
         match self {
             Self::Pca | Self::Wpca | Self::Obne => 12,
-            Self::Rrht => 64,
+            Self::Rrht => 24,
         }
     }
 }

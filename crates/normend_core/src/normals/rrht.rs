@@ -67,6 +67,8 @@ const SMALLEST_SINE: f64 = 0.0625;
 struct Bands {
     /// First bin of each band of the upper half, and one past the last.
     starts: [usize; BANDS / 2 + 3],
+    /// The height above which a unit vector is in a band, from the pole down.
+    heights: [f64; BANDS / 2 + 1],
 }
 
 impl Bands {
@@ -76,7 +78,11 @@ impl Bands {
             let circumference = (PI * band as f64 / BANDS as f64).sin();
             starts[band + 1] = starts[band] + ((2.0 * BANDS as f64 * circumference).round() as usize).max(1);
         }
-        Self { starts }
+        let middle = |band: usize| PI * (band as f64 + 0.5) / BANDS as f64;
+        Self {
+            starts,
+            heights: std::array::from_fn(|band| middle(band).cos()),
+        }
     }
 
     fn n_bins(&self) -> usize {
@@ -85,8 +91,7 @@ impl Bands {
 
     /// The bin of a unit vector of the upper half.
     fn bin(&self, direction: DVec3) -> usize {
-        let polar = direction.z.clamp(-1.0, 1.0).acos();
-        let band = ((polar * BANDS as f64 / PI).round() as usize).min(BANDS / 2 + 1);
+        let band = self.heights.iter().take_while(|&&height| direction.z <= height).count();
         let (start, end) = (self.starts[band], self.starts[band + 1]);
         let turn = direction.y.atan2(direction.x) / (2.0 * PI);
         let n = end - start;
@@ -158,12 +163,12 @@ impl<'a> Accumulator<'a> {
             let (origin, u, v) = (at(a), at(b), at(c));
             let (u, v) = (u - origin, v - origin);
             let normal = u.cross(v);
-            let length = normal.length();
-            // `!(a > b)` also holds for lengths so small that the product is zero.
-            if !(length > SMALLEST_SINE * u.length() * v.length()) {
+            let squared_length = normal.length_squared();
+            // Points in one place span nothing either.
+            if squared_length <= SMALLEST_SINE * SMALLEST_SINE * u.length_squared() * v.length_squared() {
                 continue;
             }
-            let direction = turned * (normal / length);
+            let direction = turned * (normal / squared_length.sqrt());
             let direction = if direction.z < 0.0 { -direction } else { direction };
             let bin = self.bands.bin(direction);
             n_votes += 1;
@@ -177,9 +182,9 @@ impl<'a> Accumulator<'a> {
                 }
             }
             let runner_up = if second == first { 0 } else { self.counts[second] };
-            let lead = f64::from(self.counts[first] - runner_up);
+            let lead = u32::from(self.counts[first] - runner_up);
             // Two intervals of half-width 1/√T do not overlap (Boulch and Marlet, eq. 2).
-            if lead > 2.0 * f64::from(n_votes).sqrt() {
+            if lead * lead > 4 * u32::from(n_votes) {
                 break;
             }
         }
