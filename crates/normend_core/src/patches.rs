@@ -140,18 +140,18 @@ impl Patches {
         found
     }
 
-    /// The patches to turn at `point`, of those around it that `may_turn` allows; `None` when it allows none. `may_turn` takes
-    /// leaves, and what it refuses it must refuse with more leaves too.
+    /// The patches to turn at `point`, of those around it that `may_turn` allows; `None` when it allows none. It is asked from
+    /// the smallest patch to the largest, until it refuses one.
     ///
     /// The default is the patch with the weakest boundary, the smaller of equal ones, among those of at most half the
     /// component: of two parts the smaller is the one that is wrong.
-    pub fn offer(&self, point: u32, may_turn: impl Fn(Range<u32>) -> bool) -> Option<Offer> {
+    pub fn offer(&self, point: u32, mut may_turn: impl FnMut(Patch) -> bool) -> Option<Offer> {
         let mut allowed: Vec<Patch> = Vec::new();
         let mut n_component = 0;
         let mut refused = false;
         for patch in self.around(point) {
             n_component = patch.n_points;
-            refused = refused || !may_turn(patch.leaves());
+            refused = refused || !may_turn(patch);
             if !refused {
                 allowed.push(patch);
             }

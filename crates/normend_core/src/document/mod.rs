@@ -103,7 +103,7 @@ impl Derived {
     fn patch_to_turn(&self, point: u32, n_points: u32) -> Result<(&TurnedPatches, Patch), EditError> {
         let turned = self.turned.as_ref().ok_or(EditError::NoPatches)?;
         let patch = turned.patches().find(point, n_points);
-        match turned.n_vouched(patch.leaves()) {
+        match turned.n_hindering(patch, point) {
             0 => Ok((turned, patch)),
             n_vouched => Err(EditError::Vouched { n_vouched }),
         }
@@ -289,10 +289,7 @@ impl Document {
     pub fn offer(&self, point: u32) -> Result<Option<Offer>, EditError> {
         let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
         self.check_point(point)?;
-        Ok(derived.turned.as_ref().and_then(|turned| {
-            let may_turn = |leaves| !turned.any_vouched(leaves);
-            turned.patches().offer(point, may_turn)
-        }))
+        Ok(derived.turned.as_ref().and_then(|turned| turned.offer(point)))
     }
 
     /// What `Edit::TurnPatch` would turn, without changing anything.
@@ -303,7 +300,7 @@ impl Document {
         let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
         self.check_point(point)?;
         let (turned, patch) = derived.patch_to_turn(point, n_points)?;
-        Ok(turned.patches().positions(patch, &derived.propagation.tree))
+        Ok(turned.positions(patch, &derived.propagation.tree))
     }
 
     /// What `Edit::TurnWhole(point)` would turn, without changing anything.

@@ -37,6 +37,15 @@ fn propagation(turned: [bool; 8]) -> Propagation {
     }
 }
 
+fn source(point: u32, normal: Vec3) -> Source {
+    Source {
+        point,
+        normal,
+        origin: Origin::Picked,
+        patch: None,
+    }
+}
+
 const UP: [bool; 8] = [false; 8];
 
 fn row(turned: [bool; 8]) -> Document {
@@ -92,7 +101,7 @@ fn what_is_vouched_for_is_not_offered_and_not_turned() {
         Some((sizes, offer.default))
     };
     assert_eq!(sizes(&document, 6), Some((vec![1, 2, 4, 8], 1)));
-    turn(&mut document, 5, 1);
+    document.apply(Edit::AddSources(vec![source(5, Vec3::Z)])).unwrap();
     assert_eq!(sizes(&document, 6), Some((vec![1, 2], 1)));
     assert_eq!(sizes(&document, 4), Some((vec![1], 0)));
     assert_eq!(sizes(&document, 5), None);
@@ -101,6 +110,31 @@ fn what_is_vouched_for_is_not_offered_and_not_turned() {
     assert_eq!(error, EditError::Vouched { n_vouched: 1 });
     assert!(error.to_string().contains("would turn 1 of the points you vouched for"));
     assert_eq!(document.orientation(), Some(&bits));
+}
+
+#[test]
+fn a_larger_patch_leaves_the_patches_in_it_alone() {
+    let mut document = row(UP);
+    turn(&mut document, 2, 2);
+    turn(&mut document, 5, 1);
+    assert_eq!(down(&document), "235");
+    // The rest of the first half, and then of the second; the clicked point must be of the rest.
+    let edit = Edit::TurnPatch { point: 0, n_points: 4 };
+    assert_eq!(document.preview_turn_patch(0, 4).unwrap().n_points(), 2);
+    assert_eq!(document.apply(edit.clone()).unwrap().n_points(), 2);
+    assert_eq!(down(&document), "01235");
+    let hindered = Edit::TurnPatch { point: 3, n_points: 4 };
+    assert_eq!(document.apply(hindered), Err(EditError::Vouched { n_vouched: 2 }));
+    document.apply(Edit::TurnPatch { point: 7, n_points: 4 }).unwrap();
+    assert_eq!(down(&document), "01234567");
+    // Each is taken back alone; what a larger patch covers stays as that says.
+    document.apply(Edit::RemoveSources(vec![2])).unwrap();
+    assert_eq!(down(&document), "01234567");
+    document.apply(Edit::RemoveSources(vec![0])).unwrap();
+    assert_eq!(down(&document), "4567");
+    (0..4).for_each(|_| drop(document.undo()));
+    assert_eq!(document.apply(edit).unwrap().n_points(), 2);
+    assert_eq!(down(&document), "01235");
 }
 
 #[test]

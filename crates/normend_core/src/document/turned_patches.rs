@@ -7,10 +7,9 @@
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
 use std::sync::Arc;
 
-use crate::patches::Patch;
+use crate::patches::{Offer, Patch};
 use crate::{Change, Patches, Source, SpanningTree};
 
 /// The patches of the sources, and which of them are turned.
@@ -18,9 +17,25 @@ use crate::{Change, Patches, Source, SpanningTree};
 pub(super) struct TurnedPatches {
     patches: Arc<Patches>,
     /// The sources by the leaf of their point.
-    sources: BTreeMap<u32, Source>,
+    sources: BTreeMap<u32, Vouched>,
     /// The turned patches, each with the point of its source.
     turned: BTreeSet<(Patch, u32)>,
+}
+
+/// A source and its patch.
+#[derive(Clone, Copy, Debug)]
+struct Vouched {
+    source: Source,
+    patch: Option<Patch>,
+}
+
+impl Vouched {
+    /// Whether `patch`, which holds the source's point and the leaf of a click, cannot be turned by the click: it would turn
+    /// the point, or it would leave the clicked point as it is, which belongs to the patch of the source.
+    fn hinders(&self, patch: Patch, clicked: u32) -> bool {
+        self.patch
+            .is_none_or(|own| own.n_points >= patch.n_points || own.leaves().contains(&clicked))
+    }
 }
 
 impl TurnedPatches {
@@ -40,17 +55,48 @@ impl TurnedPatches {
 
     /// All sources.
     pub fn sources(&self) -> impl Iterator<Item = &Source> {
-        self.sources.values()
+        self.sources.values().map(|vouched| &vouched.source)
     }
 
-    /// How many of `leaves` are points of sources.
-    pub fn n_vouched(&self, leaves: Range<u32>) -> usize {
-        self.sources.range(leaves).count()
+    /// The patches to turn at `point`; see [`Patches::offer`].
+    pub fn offer(&self, point: u32) -> Option<Offer> {
+        // Who does not hinder a patch does not hinder a larger one, so each source is looked at once.
+        let leaf = self.patches.leaf(point);
+        let mut seen = leaf..leaf;
+        self.patches.offer(point, |patch| {
+            let leaves = patch.leaves();
+            let added = [leaves.start..seen.start, seen.end..leaves.end];
+            seen = leaves;
+            let mut added = added.into_iter().flat_map(|leaves| self.sources.range(leaves));
+            !added.any(|(_, vouched)| vouched.hinders(patch, leaf))
+        })
     }
 
-    /// Whether any of `leaves` is the point of a source.
-    pub fn any_vouched(&self, leaves: Range<u32>) -> bool {
-        self.sources.range(leaves).next().is_some()
+    /// How many sources `patch` cannot be turned for at `point`.
+    pub fn n_hindering(&self, patch: Patch, point: u32) -> usize {
+        let leaf = self.patches.leaf(point);
+        let sources = self.sources.range(patch.leaves());
+        sources.filter(|(_, vouched)| vouched.hinders(patch, leaf)).count()
+    }
+
+    /// The positions that turn with `patch`: all but those of patches in it that sources vouch for.
+    pub fn positions(&self, patch: Patch, tree: &SpanningTree) -> Change {
+        let within = self
+            .sources
+            .range(patch.leaves())
+            .filter_map(|(_, vouched)| vouched.patch);
+        let mut within: Vec<Patch> = within.filter(|within| within.n_points < patch.n_points).collect();
+        within.sort_unstable_by_key(|within| (within.leaves().start, Reverse(within.n_points)));
+        let mut flips = Flips::default();
+        flips.flip(patch);
+        let mut end = 0;
+        for outermost in within {
+            if outermost.leaves().start >= end {
+                flips.flip(outermost);
+                end = outermost.leaves().end;
+            }
+        }
+        flips.positions(&self.patches, tree)
     }
 
     /// Whether the turned patches that hold `patch`, itself included, turn its points together. `point` is one of them.
@@ -89,28 +135,32 @@ impl TurnedPatches {
         let mut changed = Vec::new();
         for (point, after) in sources {
             let leaf = self.patches.leaf(point);
+            let after = after.map(|source| Vouched {
+                source,
+                patch: source.patch.map(|patch| self.patches.find(point, patch.n_points)),
+            });
             let before = match after {
-                Some(source) => self.sources.insert(leaf, source),
+                Some(vouched) => self.sources.insert(leaf, vouched),
                 None => self.sources.remove(&leaf),
             };
-            if let Some(patch) = before.and_then(|source| self.patch_of(&source)) {
+            if let Some(patch) = before.and_then(|vouched| vouched.patch) {
                 self.turn_back(patch, point, &mut flips);
                 changed.push(patch);
             }
-            changed.extend(after.and_then(|source| self.patch_of(&source)));
+            changed.extend(after.and_then(|vouched| vouched.patch));
         }
         let mut undecided = BTreeSet::new();
         for patch in changed {
-            for source in self.sources.range(patch.leaves()).map(|(_, source)| source) {
-                let within = self.patch_of(source).filter(|within| within.n_points <= patch.n_points);
-                undecided.extend(within.map(|within| (Reverse(within.n_points), source.point, within)));
+            for vouched in self.sources.range(patch.leaves()).map(|(_, vouched)| vouched) {
+                let within = vouched.patch.filter(|within| within.n_points <= patch.n_points);
+                undecided.extend(within.map(|within| (Reverse(within.n_points), vouched.source.point, within)));
             }
         }
         for &(_, point, patch) in &undecided {
             self.turn_back(patch, point, &mut flips);
         }
         for (_, point, patch) in undecided {
-            let source = &self.sources[&self.patches.leaf(point)];
+            let source = &self.sources[&self.patches.leaf(point)].source;
             let mended = source.patch.is_some_and(|patch| patch.amid_mended);
             if is_flipped(source) != (self.turns(patch, point) != mended) {
                 self.turned.insert((patch, point));
@@ -118,11 +168,6 @@ impl TurnedPatches {
             }
         }
         flips.positions(&self.patches, tree)
-    }
-
-    fn patch_of(&self, source: &Source) -> Option<Patch> {
-        let patch = source.patch?;
-        Some(self.patches.find(source.point, patch.n_points))
     }
 
     fn turn_back(&mut self, patch: Patch, point: u32, flips: &mut Flips) {

@@ -149,11 +149,11 @@ proptest! {
     ) {
         let patches = Patches::new(&world.tree, &borrowed(&levels));
         let vouched: Vec<u32> = vouched.iter().map(|index| patches.leaf(index.index(world.n_points) as u32)).collect();
-        let may_turn = |leaves: Range<u32>| !vouched.iter().any(|leaf| leaves.contains(leaf));
+        let may_turn = |patch: Patch| !vouched.iter().any(|leaf| patch.leaves().contains(leaf));
         for point in 0..world.n_points as u32 {
             let around: Vec<Patch> = patches.around(point).collect();
             let n_component = around[around.len() - 1].n_points;
-            let allowed: Vec<Patch> = around.into_iter().filter(|patch| may_turn(patch.leaves())).collect();
+            let allowed: Vec<Patch> = around.into_iter().filter(|patch| may_turn(*patch)).collect();
             let offer = patches.offer(point, may_turn);
             prop_assert_eq!(offer.is_some(), !allowed.is_empty());
             let Some(offer) = offer else { continue };
