@@ -8,9 +8,12 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Args, CommandFactory, Parser, Subcommand};
+use glam::DVec3;
+use normend_core::evidence::Station;
 use normend_core::propagation::{ETA, VIEWS};
 use normend_core::shapes::ShapeKind;
 use normend_core::{EdgeRule, Estimator, Parameters, Preset, SideRule, SourceRule, Start};
+use normend_io::{ReadError, Scan};
 use normend_render::{DisplayMode, StandardView};
 
 use self::bench::BenchArguments;
@@ -160,8 +163,52 @@ pub struct PropagationArguments {
     pub eta: Option<f32>,
 
     /// Which side is the right one: outside of objects, the scanner's, the upper one, inside of rooms, that of given normals
-    #[arg(long, value_name = "NAME", value_parser = one_of(&SideRule::ALL, SideRule::name), default_value = SideRule::default().name())]
-    pub rule: SideRule,
+    /// [default: outward, or toward-scanner where its place is given]
+    #[arg(long, value_name = "NAME", value_parser = one_of(&SideRule::ALL, SideRule::name))]
+    pub rule: Option<SideRule>,
+}
+
+/// Where the scanner stood.
+#[derive(Clone, Debug, Default, Args)]
+pub struct ScannerArguments {
+    /// Where the scanner stood that measured all points, in the scan's coordinates
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true, conflicts_with = "sensors")]
+    pub scanner: Option<DVec3>,
+
+    /// Table of the scanner's places: lines of first point (from 0), count, x, y, z
+    #[arg(long, value_name = "TSV")]
+    pub sensors: Option<PathBuf>,
+}
+
+impl ScannerArguments {
+    /// Whether a place was given.
+    pub fn is_given(&self) -> bool {
+        self.scanner.is_some() || self.sensors.is_some()
+    }
+
+    /// The scanner's places for `scan`.
+    ///
+    /// # Errors
+    /// A table that cannot be read or is not of this scan.
+    pub fn stations(&self, scan: &Scan) -> Result<Vec<Station>, ReadError> {
+        match (&self.scanner, &self.sensors) {
+            (Some(position), _) => Ok(vec![Station {
+                points: 0..scan.cloud.n_points() as u32,
+                position: *position,
+            }]),
+            (None, Some(path)) => normend_io::read_stations(path, scan),
+            (None, None) => Ok(Vec::new()),
+        }
+    }
+}
+
+/// Parses three finite coordinates.
+fn place(typed: &str) -> Result<DVec3, String> {
+    let parsed: Option<Vec<f64>> = typed.split(',').map(|number| number.trim().parse().ok()).collect();
+    match parsed.as_deref() {
+        Some(&[x, y, z]) if DVec3::new(x, y, z).is_finite() => Ok(DVec3::new(x, y, z)),
+        _ => Err("type three numbers, as in 1.5,0,-2".to_owned()),
+    }
 }
 
 impl From<PropagationArguments> for Parameters {
@@ -179,7 +226,7 @@ impl From<PropagationArguments> for Parameters {
             sources: typed.sources.unwrap_or(preset.sources),
             views: typed.views.unwrap_or(preset.views),
             eta: typed.eta.unwrap_or(preset.eta),
-            rule: typed.rule,
+            rule: typed.rule.unwrap_or(preset.rule),
         }
     }
 }
@@ -195,15 +242,22 @@ The output's extension says its format; without one, or with the input's, it is 
 .asc .pts .csv) or back go positions and normals only.
 
 The report (--json) has a line for each input: an object with input, output, points, left_out (rows without finite \
-coordinates), components, sources (places where signs start), voted_sources (those found by visibility), parameters, \
-seconds (read, neighbors, normals, sources where voted, graph, tree, signs, write, total) and peak_rss_bytes (of the program so far; null where the system does not tell). A failed \
-input has input and error.
+coordinates), components, sources (places where signs start), voted_sources (those found by visibility), \
+without_evidence (components that no evidence tells the side of), parameters, seconds (read, neighbors, normals, \
+sources where voted, graph, tree, signs, write, total) and peak_rss_bytes (of the program so far; null where the system \
+does not tell). A failed input has input and error.
+
+The right side of each component (--rule) is decided by what is seen of it from outside (outward), by the scanner's place \
+(toward-scanner), by +z (up), by what is seen from within (into-room), or by the file's normals (given); where that says \
+nothing, by what is seen from outside.
 
 Examples:
   normend orient scan.ply -o oriented.ply
   normend orient a.ply b.xyz -o oriented/ --json report.jsonl
   normend orient scan.ply -o oriented.ply --estimator pca --k-graph 6 --json - | jq .seconds
-  normend orient meshlab.ply -o filled.ply --start keep")]
+  normend orient meshlab.ply -o filled.ply --start keep
+  normend orient room.ply -o oriented.ply --rule into-room
+  normend orient tower.ply -o oriented.ply --scanner 1.5,0,-2")]
 pub struct OrientArguments {
     /// Scans to orient: PLY, or XYZ text
     #[arg(required = true, value_name = "IN")]
@@ -216,6 +270,10 @@ pub struct OrientArguments {
     /// How signs are found.
     #[command(flatten)]
     pub propagation: PropagationArguments,
+
+    /// Where the scanner stood.
+    #[command(flatten)]
+    pub scanner: ScannerArguments,
 
     /// Write a report, a JSON object a line, to FILE or to standard output (-)
     #[arg(long, value_name = "FILE")]
@@ -459,6 +517,21 @@ mod tests {
                 ..preset.parameters()
             };
             assert_eq!(Parameters::from(orient.propagation), expect);
+        }
+    }
+
+    #[test]
+    fn places_of_the_scanner() {
+        let stand = |typed: &str| {
+            let typed = ["normend", "orient", "a.ply", "-o", "b.ply", "--scanner", typed];
+            match Arguments::try_parse_from(typed).ok()?.command {
+                Some(Command::Orient(orient)) => orient.scanner.scanner,
+                _ => None,
+            }
+        };
+        assert_eq!(stand("-1.5,0, 2e3"), Some(DVec3::new(-1.5, 0.0, 2000.0)));
+        for wrong in ["", "1,2", "1,2,3,4", "1,2,x", "1,2,nan", "1 2 3"] {
+            assert_eq!(stand(wrong), None, "{wrong}");
         }
     }
 

@@ -3,6 +3,7 @@
 mod given;
 mod preset;
 mod source_rule;
+mod sides;
 mod splat_radii;
 
 use std::ops::RangeInclusive;
@@ -13,9 +14,12 @@ use fixedbitset::FixedBitSet;
 use glam::Vec3;
 
 use self::given::GivenNormals;
+use self::sides::sides;
 pub use self::preset::Preset;
 pub use self::source_rule::{ETA, SourceRule, VIEWS};
+use crate::evidence::Known;
 use crate::progress::Part;
+use crate::side_rule::{Clues, Side};
 use crate::{
     Cancelled, EdgeRule, Estimator, Neighbors, Patches, PointCloud, Progress, Regions, RiemannianGraph, SideRule, Source,
     SpanningTree, normals, visibility,
@@ -159,26 +163,30 @@ pub struct Propagation {
     pub voted_sources: Arc<Vec<Source>>,
     /// The patches that a click can turn; `None` where the tree comes from no agglomeration.
     pub patches: Option<Arc<Patches>>,
+    /// The side of each component by [`Parameters::rule`], in the order of the tree's roots. Empty where the default sources
+    /// decide, or signs start as given.
+    pub sides: Vec<Side>,
     /// Wall seconds of each stage.
     pub seconds: Vec<(Stage, f64)>,
 }
 
 impl Propagation {
-    /// Runs neighbors → normals → graph → tree → initial cuts. `given` are the file's normals by point, if it has any
-    /// (zero or NaN where a point has none); without one that can be used [`Start::Keep`] is the same as
-    /// [`Start::Estimate`].
+    /// Runs neighbors → normals → graph → tree → initial cuts. `known` is what is known besides, such as the file's
+    /// normals; without one that can be used [`Start::Keep`] is the same as [`Start::Estimate`].
     ///
     /// # Errors
     /// [`Cancelled`] when `progress` asks to stop; nothing else.
-    pub fn new(
+    pub fn new<'a>(
         cloud: &PointCloud,
-        given: Option<&[Vec3]>,
+        known: impl Into<Known<'a>>,
         parameters: Parameters,
         progress: &dyn Progress,
     ) -> Result<Self, Cancelled> {
+        let known = known.into();
         let k_normals = clamp(parameters.k_normals, Parameters::K_NORMALS);
         let k_graph = clamp(parameters.k_graph, Parameters::K_GRAPH);
-        let given = given
+        let given = known
+            .given
             .filter(|_| parameters.start == Start::Keep)
             .map(GivenNormals::new)
             .filter(|given| !given.missing.is_full());
@@ -221,13 +229,23 @@ impl Propagation {
         clock.finish(Stage::Graph);
 
         progress.stage("Growing the spanning tree");
-        let tree = SpanningTree::new(&graph, &Part::new(progress, 0.8..1.0))?;
+        let tree = SpanningTree::new(&graph, &Part::new(progress, 0.8..0.9))?;
         drop(graph);
         let mut initially_turned = FixedBitSet::with_capacity(tree.n_points());
         let mut default_sources: Vec<u32> = tree.roots().iter().map(|&root| highest(cloud, &tree, root)).collect();
         for (&root, &source) in tree.roots().iter().zip(&default_sources) {
             let turned = points_down(normals[source as usize]) ^ tree.phi(tree.position(source));
             initially_turned.set(root as usize, turned);
+        }
+        let mut decided = Vec::new();
+        if given.is_none() && parameters.rule != SideRule::Outward {
+            progress.stage("Looking for the right side");
+            let mut clues = Clues::new(cloud, &normals, &splat_radii);
+            clues.gather(parameters.rule, &known, &Part::new(progress, 0.9..1.0))?;
+            decided = sides(&tree, parameters.rule, &clues);
+            for (&root, side) in tree.roots().iter().zip(&decided) {
+                initially_turned.set(root as usize, side.turned);
+            }
         }
         let mut initial_cuts = FixedBitSet::with_capacity(tree.n_points());
         if let Some(given) = &given {
@@ -250,6 +268,7 @@ impl Propagation {
             base_regions,
             default_sources,
             voted_sources: Arc::new(voted_sources),
+            sides: decided,
             patches: None,
             seconds: clock.seconds,
         })
@@ -269,8 +288,10 @@ impl Propagation {
             "as given"
         } else if !self.voted_sources.is_empty() {
             "visible points outward"
-        } else {
+        } else if self.sides.is_empty() {
             "farthest along +z up"
+        } else {
+            self.parameters.rule.label()
         }
     }
 

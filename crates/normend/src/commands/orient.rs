@@ -8,7 +8,8 @@ use std::time::Instant;
 
 use anyhow::Context;
 use normend_core::progress::Part;
-use normend_core::{Document, EditError, Parameters, Progress, Propagation, Start};
+use normend_core::evidence::Known;
+use normend_core::{Document, EditError, Parameters, Progress, Propagation, SideRule, Start};
 use normend_io::WriteOptions;
 use serde::{Serialize, Serializer};
 
@@ -52,6 +53,7 @@ struct Oriented {
     components: usize,
     sources: usize,
     voted_sources: usize,
+    without_evidence: usize,
     #[serde(serialize_with = "serialize_parameters")]
     parameters: Parameters,
     seconds: Seconds,
@@ -111,11 +113,11 @@ pub fn run(arguments: OrientArguments) -> anyhow::Result<Outcome> {
     if let Some(folder) = &folder {
         fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     }
-    let parameters = Parameters::from(arguments.propagation);
+    let parameters = parameters(&arguments);
     let mut outcome = Outcome::Done;
     for job in &jobs {
         let bar = Bar::new(&title_of(&job.input), arguments.common.quiet);
-        let line = match orient(job, parameters, arguments.overwrite, &bar) {
+        let line = match orient(job, parameters, &arguments, &bar) {
             Ok(oriented) => {
                 bar.say(&sentence(&oriented));
                 Report::Done(Box::new(oriented))
@@ -143,6 +145,16 @@ pub fn run(arguments: OrientArguments) -> anyhow::Result<Outcome> {
     Ok(outcome)
 }
 
+/// The parameters that were typed; who says where the scanner stood wants its side.
+fn parameters(arguments: &OrientArguments) -> Parameters {
+    let typed = Parameters::from(arguments.propagation);
+    let rule = match arguments.propagation.rule {
+        None if arguments.scanner.is_given() => SideRule::TowardScanner,
+        _ => typed.rule,
+    };
+    Parameters { rule, ..typed }
+}
+
 /// Where each input goes, with everything refused that would lose a file.
 ///
 /// # Errors
@@ -150,6 +162,16 @@ pub fn run(arguments: OrientArguments) -> anyhow::Result<Outcome> {
 fn plan(arguments: &OrientArguments) -> anyhow::Result<Plan> {
     let output = &arguments.output;
     check_is_file_name(output)?;
+    if arguments.propagation.rule == Some(SideRule::TowardScanner) && !arguments.scanner.is_given() {
+        return Err(wrong_use(
+            "the rule toward-scanner needs the scanner's place: give --scanner X,Y,Z or --sensors TSV",
+        ));
+    }
+    if arguments.scanner.sensors.is_some() && arguments.inputs.len() > 1 {
+        return Err(wrong_use(
+            "the table of --sensors belongs to one scan: orient the scans one by one",
+        ));
+    }
     let is_folder = arguments.inputs.len() > 1 || output.is_dir() || ends_with_separator(output);
     if is_folder && output.exists() && !output.is_dir() {
         return Err(wrong_use(format!(
@@ -231,8 +253,8 @@ pub(super) fn open_report(path: &Path, overwrite: bool) -> anyhow::Result<Box<dy
 }
 
 /// Reads, orients and writes one scan.
-fn orient(job: &Job, parameters: Parameters, overwrite: bool, bar: &Bar) -> anyhow::Result<Oriented> {
-    check_may_write(&job.output, overwrite)?;
+fn orient(job: &Job, parameters: Parameters, arguments: &OrientArguments, bar: &Bar) -> anyhow::Result<Oriented> {
+    check_may_write(&job.output, arguments.overwrite)?;
     let started = Instant::now();
     let mut seconds = Seconds::default();
 
@@ -246,14 +268,25 @@ fn orient(job: &Job, parameters: Parameters, overwrite: bool, bar: &Bar) -> anyh
         ));
     }
 
-    let given = scan.given_normals.as_ref().map(|normals| normals.as_slice());
-    let propagation = Propagation::new(&scan.cloud, given, parameters, &Part::new(bar, 0.1..0.9))?;
+    if parameters.rule == SideRule::Given && scan.given_normals.is_none() {
+        bar.say(&format!(
+            "{} has no normals to follow: the side that is seen from outside counts",
+            job.input.display()
+        ));
+    }
+
+    let known = Known {
+        given: scan.given_normals.as_ref().map(|normals| normals.as_slice()),
+        stations: &arguments.scanner.stations(&scan)?,
+    };
+    let propagation = Propagation::new(&scan.cloud, known, parameters, &Part::new(bar, 0.1..0.9))?;
     seconds
         .0
         .extend(propagation.seconds.iter().map(|&(stage, secs)| (stage.name(), secs)));
     let components = propagation.tree.roots().len();
     let sources = propagation.base_regions.n_regions();
     let voted_sources = propagation.voted_sources.len();
+    let without_evidence = propagation.sides.iter().filter(|side| side.rule.is_none()).count();
 
     let signs_started = Instant::now();
     let rule = propagation.rule();
@@ -266,7 +299,7 @@ fn orient(job: &Job, parameters: Parameters, overwrite: bool, bar: &Bar) -> anyh
     let write_started = Instant::now();
     let options = WriteOptions {
         rule: rule.to_owned(),
-        overwrite_input: overwrite,
+        overwrite_input: arguments.overwrite,
     };
     let writing = Part::new(bar, 0.9..1.0);
     writing.report(0.0)?;
@@ -282,6 +315,7 @@ fn orient(job: &Job, parameters: Parameters, overwrite: bool, bar: &Bar) -> anyh
         components,
         sources,
         voted_sources,
+        without_evidence,
         parameters,
         seconds,
         peak_rss_bytes: peak_rss_bytes(),
@@ -295,8 +329,12 @@ fn sentence(oriented: &Oriented) -> String {
         0 => String::new(),
         n => format!(" ({} without finite coordinates left out)", counted(n, "row")),
     };
+    let without_evidence = match oriented.without_evidence {
+        0 => String::new(),
+        n => format!(" ({n} without evidence of its side)"),
+    };
     format!(
-        "{}: {}{left_out}, {}, {total:.1} s → {}",
+        "{}: {}{left_out}, {}{without_evidence}, {total:.1} s → {}",
         oriented.input.display(),
         counted(oriented.points, "point"),
         counted(oriented.components, "component"),

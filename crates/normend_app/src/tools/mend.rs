@@ -412,6 +412,7 @@ mod tests {
             base_regions: Regions::new(Arc::clone(&tree), Default::default(), Default::default()),
             default_sources: vec![0],
             voted_sources: Arc::default(),
+            sides: Vec::new(),
             patches: Some(Arc::new(Patches::new(&tree, &levels))),
             tree,
             seconds: Vec::new(),

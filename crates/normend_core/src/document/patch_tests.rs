@@ -32,6 +32,7 @@ fn propagation(turned: [bool; 8]) -> Propagation {
         base_regions: Regions::new(Arc::clone(&world.tree), world.initial_cuts.clone(), initially_turned),
         default_sources: vec![0],
         voted_sources: Arc::default(),
+        sides: Vec::new(),
         patches: Some(Arc::new(Patches::new(&world.tree, &levels))),
         seconds: Vec::new(),
     }

@@ -51,6 +51,7 @@ fn propagation_of(world: &World, normals: &[Vec3]) -> Propagation {
             world.initially_turned.clone(),
         ),
         default_sources: default_sources(&world.tree),
+        sides: Vec::new(),
         patches: None,
         voted_sources: Arc::default(),
         seconds: Vec::new(),

@@ -37,6 +37,7 @@ fn propagation(world: &World, voted: &Signs) -> Propagation {
             .map(|&root| world.tree.order()[root as usize])
             .collect(),
         voted_sources: Arc::new(voted.iter().map(source).collect()),
+        sides: Vec::new(),
         patches: None,
         seconds: Vec::new(),
     }

@@ -325,7 +325,7 @@ fn given_signs_need_no_votes() {
         ..Preset::Paper.parameters()
     };
     let inward: Vec<Vec3> = shape.normals.iter().map(|&normal| -normal).collect();
-    let propagation = Propagation::new(&cloud, Some(&inward), parameters, &Silent).unwrap();
+    let propagation = Propagation::new(&cloud, Some(inward.as_slice()), parameters, &Silent).unwrap();
     assert!(propagation.voted_sources.is_empty());
     assert_eq!(propagation.initial_normals(), inward);
 }
