@@ -448,6 +448,14 @@ impl App {
         self.act(Action::Propagate(parameters));
     }
 
+    /// Shows the open scan as another propagation of it orients it, just as a finished job does.
+    pub fn show_propagation(&mut self, propagation: normend_core::Propagation) {
+        self.install(Uploaded {
+            result: propagation,
+            cloud: None,
+        });
+    }
+
     fn install(&mut self, propagation: Uploaded<normend_core::Propagation>) {
         let Some(session) = &mut self.session else { return };
         let Uploaded {
