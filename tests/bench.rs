@@ -254,3 +254,15 @@ fn what_cannot_be_measured_is_said_and_counted() {
     let (_, err) = run(&folder, "bench quality set --only teapot", 2);
     assert!(err.contains("teapot"), "{err}");
 }
+
+#[test]
+fn the_papers_figures_need_clouds_and_replace_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, err) = run(&folder, "bench paper nowhere", 1);
+    assert!(err.contains("nowhere"), "{err}");
+    fs::write(folder.path().join("paper.md"), "mine").unwrap();
+    write_sphere(&folder, "sharp", "ball", false);
+    let (_, err) = run(&folder, "bench paper set -o paper.md", 1);
+    assert!(err.contains("paper.md exists already"), "{err}");
+    assert_eq!(fs::read_to_string(folder.path().join("paper.md")).unwrap(), "mine");
+}

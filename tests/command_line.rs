@@ -178,6 +178,28 @@ fn orient_improves_on_wrong_normals() {
 }
 
 #[test]
+fn the_paper_is_a_preset_that_flags_change() {
+    let folder = folder();
+    fs::write(folder.path().join("scan.ply"), ply_of(&sphere(2000))).unwrap();
+    let check = |typed: &str, sources: &str, eta: f64, is_voted: bool| {
+        let oriented = run(&folder, &format!("orient scan.ply -o out.ply --overwrite --json - {typed}")).expect(0);
+        let report = oriented.json();
+        assert_eq!(report["parameters"]["sources"], sources, "{typed}");
+        assert_eq!(report["parameters"]["eta"], eta, "{typed}");
+        assert_eq!(report["voted_sources"].as_u64().unwrap() > 1, is_voted, "{typed}");
+        assert_eq!(report["seconds"]["sources"].is_number(), is_voted, "{typed}");
+        if is_voted {
+            assert_eq!(report["sources"], report["voted_sources"], "{typed}");
+        }
+    };
+    check("--preset tree", "highest", 0.07, false);
+    check("--preset paper", "hidden-points", 0.07, true);
+    check("--preset paper --sources hidden-points-mended --eta 0.2", "hidden-points-mended", 0.2, true);
+    check("--preset tree --sources hidden-points --views 14 --estimator rrht", "hidden-points", 0.07, true);
+    check("--preset paper --sources highest", "highest", 0.07, false);
+}
+
+#[test]
 fn the_report_has_every_field() {
     let folder = folder();
     fs::write(folder.path().join("scan.ply"), ply_of(&sphere(2000))).unwrap();
@@ -196,7 +218,8 @@ fn the_report_has_every_field() {
     assert_eq!(
         report["parameters"],
         serde_json::json!({
-            "estimator": "wpca", "k_normals": 9, "k_graph": 7, "edge_rule": "dot", "start": "estimate"
+            "estimator": "wpca", "k_normals": 9, "k_graph": 7, "edge_rule": "dot", "start": "estimate",
+            "sources": "highest", "views": 8, "eta": 0.07, "rule": "outward"
         })
     );
     let seconds = report["seconds"].as_object().unwrap();

@@ -16,7 +16,7 @@ use egui::{Key, Modifiers, Vec2};
 use egui_kittest::kittest::Queryable;
 use normend_app::command::Command;
 use normend_app::messages::Level;
-use normend_core::{Silent, Start, shapes};
+use normend_core::{Silent, SourceRule, Start, shapes};
 
 use driver::{
     N_POINTS, is_back, is_flipped_source, is_front, n_different, sphere_with_wrong_cap, sphere_without_normals, start,
@@ -235,6 +235,28 @@ fn other_parameters_keep_the_sources() {
     let document = editor.app().document().unwrap();
     assert_eq!(document.sources().iter().copied().collect::<Vec<_>>(), [source]);
     assert!(document.oriented_normal(source.point).unwrap().dot(source.normal) > 0.9);
+}
+
+#[test]
+fn a_preset_votes_for_sources_that_clicks_overrule() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    assert!(!editor.shows("voted for"));
+    editor.click_button("Estimate");
+    editor.choose("Preset", "Paper");
+    assert!(editor.shows("Viewpoints") && editor.shows("Changed, not applied yet"));
+    editor.click_button("Propagate");
+    editor.wait("voted sources", |app| {
+        let propagation = app.document().unwrap().propagation();
+        !app.is_busy() && propagation.is_some_and(|propagation| !propagation.voted_sources.is_empty())
+    });
+    editor.harness.run_steps(2);
+    assert!(editor.shows("voted for"));
+    let document = editor.app().document().unwrap();
+    assert!(document.sources().is_empty(), "voted sources are not the user's");
+    assert_eq!(document.parameters().sources, SourceRule::HiddenPoints);
 }
 
 #[test]

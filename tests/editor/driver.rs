@@ -81,6 +81,13 @@ impl Editor {
         self.harness.run_steps(2);
     }
 
+    /// Opens the list in the row with this label and takes `wanted` from it.
+    pub fn choose(&mut self, label: &str, wanted: &str) {
+        self.harness.get_by_role_and_label(Role::ComboBox, label).click();
+        self.harness.run_steps(2);
+        self.click_button(wanted);
+    }
+
     pub fn shows(&self, label: &str) -> bool {
         self.harness.query_all_by_label_contains(label).next().is_some()
     }
