@@ -12,7 +12,7 @@ use glam::DVec3;
 use normend_core::evidence::Station;
 use normend_core::propagation::{ETA, VIEWS};
 use normend_core::shapes::ShapeKind;
-use normend_core::{EdgeRule, Estimator, Parameters, Preset, SideRule, SourceRule, Start};
+use normend_core::{EdgeRule, Estimator, Method, Parameters, Preset, SideRule, SourceRule, Start};
 use normend_io::{ReadError, Scan};
 use normend_render::{DisplayMode, StandardView};
 
@@ -126,7 +126,7 @@ pub struct CommonArguments {
 /// How signs are found: a preset, and what is typed in place of its parameters.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct PropagationArguments {
-    /// A whole method; the flags below replace parts of it
+    /// A whole method; the flags below replace parts of it. Those of normals, graph and sources turn auto to tree
     #[arg(long, value_name = "NAME", value_parser = one_of(&Preset::ALL, Preset::name), default_value = Preset::default().name())]
     pub preset: Preset,
 
@@ -211,10 +211,28 @@ fn place(typed: &str) -> Result<DVec3, String> {
     }
 }
 
+impl PropagationArguments {
+    /// Whether a flag was typed that the automatic method has no use for.
+    fn sets_tree(&self) -> bool {
+        self.estimator.is_some()
+            || self.k_normals.is_some()
+            || self.k_graph.is_some()
+            || self.edge_rule.is_some()
+            || self.sources.is_some()
+            || self.views.is_some()
+            || self.eta.is_some()
+    }
+}
+
 impl From<PropagationArguments> for Parameters {
     fn from(typed: PropagationArguments) -> Self {
         let preset = typed.preset.parameters();
         Self {
+            method: if typed.sets_tree() {
+                Method::SpanningTree
+            } else {
+                preset.method
+            },
             estimator: typed.estimator.unwrap_or(preset.estimator),
             k_normals: typed
                 .k_normals
@@ -514,6 +532,7 @@ mod tests {
             };
             let expect = Parameters {
                 eta: 0.5,
+                method: Method::SpanningTree,
                 ..preset.parameters()
             };
             assert_eq!(Parameters::from(orient.propagation), expect);

@@ -35,6 +35,8 @@ pub mod evidence;
 
 pub mod side_rule;
 
+mod automatic;
+
 pub mod propagation;
 
 pub mod document;
@@ -50,7 +52,7 @@ pub use orientation::{Change, Orientation};
 pub use patches::Patches;
 pub use point_cloud::{PointCloud, PointCloudError};
 pub use progress::{Cancelled, Progress, Silent};
-pub use propagation::{Parameters, Preset, Propagation, SourceRule, Stage, Start};
+pub use propagation::{Method, Parameters, Preset, Propagation, SourceRule, Stage, Start};
 pub use regions::Regions;
 pub use riemannian_graph::{EdgeRule, RiemannianGraph};
 pub use side_rule::SideRule;

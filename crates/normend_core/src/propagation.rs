@@ -1,9 +1,10 @@
 //! From cloud and parameters to the tree that signs travel along: everything slow, once, in a job.
 
 mod given;
+mod method;
 mod preset;
-mod source_rule;
 mod sides;
+mod source_rule;
 mod splat_radii;
 
 use std::ops::RangeInclusive;
@@ -14,15 +15,17 @@ use fixedbitset::FixedBitSet;
 use glam::Vec3;
 
 use self::given::GivenNormals;
-use self::sides::sides;
+pub use self::method::Method;
 pub use self::preset::Preset;
+use self::sides::sides;
 pub use self::source_rule::{ETA, SourceRule, VIEWS};
-use crate::evidence::Known;
+use crate::automatic;
+use crate::evidence::{Evidence, Known};
 use crate::progress::Part;
 use crate::side_rule::{Clues, Side};
 use crate::{
-    Cancelled, EdgeRule, Estimator, Neighbors, Patches, PointCloud, Progress, Regions, RiemannianGraph, SideRule, Source,
-    SpanningTree, normals, visibility,
+    Cancelled, EdgeRule, Estimator, Neighbors, Patches, PointCloud, Progress, Regions, RiemannianGraph, SideRule,
+    Source, SpanningTree, normals, visibility,
 };
 
 /// Which normals and signs a document starts from.
@@ -59,6 +62,8 @@ impl Start {
 /// What a user can set about the propagation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
+    /// How signs are found.
+    pub method: Method,
     /// How normals are fitted.
     pub estimator: Estimator,
     /// Neighbors that a normal is fitted to, at least 3.
@@ -91,6 +96,7 @@ impl Parameters {
     /// OBNE over 12 neighbors, graph of 6. With larger neighborhoods the graph links the two sides of thin walls, where the
     /// dot product goes wrong; with smaller ones noise does. Views and eta are the paper's.
     pub(crate) const TREE: Self = Self {
+        method: Method::SpanningTree,
         estimator: Estimator::Obne,
         k_normals: 12,
         k_graph: 6,
@@ -119,6 +125,10 @@ pub enum Stage {
     Normals,
     /// Votes for sources, where the source rule asks for them.
     Sources,
+    /// What is known of the points' sides, for the automatic method.
+    Evidence,
+    /// Signed agglomeration and its spanning tree.
+    Agglomeration,
     /// Riemannian graph.
     Graph,
     /// Minimum spanning tree in preorder.
@@ -127,14 +137,24 @@ pub enum Stage {
 
 impl Stage {
     /// All stages, in order.
-    pub const ALL: [Self; 5] = [Self::Neighbors, Self::Normals, Self::Sources, Self::Graph, Self::Tree];
+    pub const ALL: [Self; 7] = [
+        Self::Neighbors,
+        Self::Normals,
+        Self::Sources,
+        Self::Evidence,
+        Self::Agglomeration,
+        Self::Graph,
+        Self::Tree,
+    ];
 
-    /// The name in reports: `neighbors`, `normals`, `sources`, `graph`, `tree`.
+    /// The name in reports: `neighbors`, `normals`, `sources`, `evidence`, `agglomeration`, `graph`, `tree`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Neighbors => "neighbors",
             Self::Normals => "normals",
             Self::Sources => "sources",
+            Self::Evidence => "evidence",
+            Self::Agglomeration => "agglomeration",
             Self::Graph => "graph",
             Self::Tree => "tree",
         }
@@ -166,6 +186,8 @@ pub struct Propagation {
     /// The side of each component by [`Parameters::rule`], in the order of the tree's roots. Empty where the default sources
     /// decide, or signs start as given.
     pub sides: Vec<Side>,
+    /// What is known of the side of each normal, for normals as they are stored; `None` where the method gathers none.
+    pub evidence: Option<Arc<Evidence>>,
     /// Wall seconds of each stage.
     pub seconds: Vec<(Stage, f64)>,
 }
@@ -190,6 +212,9 @@ impl Propagation {
             .filter(|_| parameters.start == Start::Keep)
             .map(GivenNormals::new)
             .filter(|given| !given.missing.is_full());
+        if parameters.method == Method::Agglomeration && given.is_none() {
+            return Self::automatic(cloud, &known, parameters, progress);
+        }
         let mut clock = Clock::start();
 
         progress.stage("Finding neighbors");
@@ -270,12 +295,77 @@ impl Propagation {
             voted_sources: Arc::new(voted_sources),
             sides: decided,
             patches: None,
+            evidence: None,
             seconds: clock.seconds,
         })
     }
 }
 
 impl Propagation {
+    /// The automatic method: neighbors → normals → evidence → agglomeration → sides.
+    fn automatic(
+        cloud: &PointCloud,
+        known: &Known<'_>,
+        parameters: Parameters,
+        progress: &dyn Progress,
+    ) -> Result<Self, Cancelled> {
+        let mut clock = Clock::start();
+        progress.stage("Finding neighbors");
+        let neighbors = Neighbors::find(cloud, automatic::K, &Part::new(progress, 0.0..0.25))?;
+        let splat_radii = splat_radii::splat_radii(cloud, &neighbors);
+        clock.finish(Stage::Neighbors);
+
+        progress.stage("Estimating normals");
+        let part = Part::new(progress, 0.25..0.4);
+        let unoriented = automatic::estimate_normals(cloud, &neighbors, &splat_radii, &part)?;
+        clock.finish(Stage::Normals);
+
+        progress.stage("Looking at the sides");
+        let part = Part::new(progress, 0.4..0.65);
+        let evidence = automatic::gather_evidence(cloud, &neighbors, &splat_radii, &unoriented.normals, known, &part)?;
+        clock.finish(Stage::Evidence);
+
+        progress.stage("Joining what belongs together");
+        let part = Part::new(progress, 0.65..0.95);
+        let found = automatic::orient(cloud, neighbors, &splat_radii, unoriented, evidence, &part)?;
+        clock.finish(Stage::Agglomeration);
+
+        progress.stage("Looking for the right side");
+        let mut clues = Clues::new(cloud, &found.normals, &splat_radii);
+        clues.outside = Some(found.evidence.clone());
+        clues.gather(parameters.rule, known, &Part::new(progress, 0.95..1.0))?;
+        let decided = sides(&found.tree, parameters.rule, &clues);
+        drop(clues);
+        let mut initially_turned = FixedBitSet::with_capacity(cloud.n_points());
+        for (&root, side) in found.tree.roots().iter().zip(&decided) {
+            initially_turned.set(root as usize, side.turned);
+        }
+        let default_sources = found
+            .tree
+            .roots()
+            .iter()
+            .map(|&root| highest(cloud, &found.tree, root))
+            .collect();
+        let tree = Arc::new(found.tree);
+        let no_cuts = FixedBitSet::with_capacity(cloud.n_points());
+        let base_regions = Regions::new(Arc::clone(&tree), no_cuts, initially_turned);
+        clock.finish(Stage::Tree);
+
+        Ok(Self {
+            parameters,
+            normals: Arc::new(found.normals),
+            splat_radii: Arc::new(splat_radii),
+            tree,
+            base_regions,
+            default_sources,
+            voted_sources: Arc::default(),
+            patches: Some(Arc::new(found.patches)),
+            sides: decided,
+            evidence: Some(Arc::new(found.evidence)),
+            seconds: clock.seconds,
+        })
+    }
+
     /// The voted source at `point`. O(log n).
     pub fn voted_source(&self, point: u32) -> Option<Source> {
         let index = self.voted_sources.binary_search_by_key(&point, |source| source.point);

@@ -1,5 +1,7 @@
 //! Depths of oriented discs in a picture, from in front and from behind at once.
 
+use std::ops::Range;
+
 /// A disc as a picture shows it: an ellipse of pixels with a plane of heights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Disc {
@@ -20,8 +22,31 @@ pub(super) struct Disc {
 }
 
 impl Disc {
-    fn height_at(&self, column: usize, row: usize) -> f32 {
+    /// The height of its plane in the middle of a pixel.
+    #[inline]
+    pub fn height_at(&self, column: usize, row: usize) -> f32 {
         self.height + self.slope[0] * (column as f32 + 0.5 - self.x) + self.slope[1] * (row as f32 + 0.5 - self.y)
+    }
+
+    /// The pixels of a picture whose middles it covers, row by row.
+    #[inline]
+    pub fn covered(&self, width: usize, height: usize) -> impl Iterator<Item = (usize, Range<usize>)> + use<> {
+        let Self {
+            x,
+            y,
+            radius,
+            ellipse: [a, b, c],
+            ..
+        } = *self;
+        let determinant = a * c - b * b;
+        let squared_radius = radius * radius;
+        let reach = (squared_radius * a / determinant).sqrt();
+        middles_between(y - reach, y + reach, height).map(move |row| {
+            let up = row as f32 + 0.5 - y;
+            let half = (a * squared_radius - determinant * up * up).max(0.0).sqrt() / a;
+            let middle = x - b * up / a;
+            (row, middles_between(middle - half, middle + half, width))
+        })
     }
 }
 
@@ -57,15 +82,7 @@ impl DepthBuffer {
     /// Draws a disc: every pixel whose middle it covers gets the height of its plane there.
     #[inline]
     pub fn draw(&mut self, disc: &Disc) {
-        let [a, b, c] = disc.ellipse;
-        let determinant = a * c - b * b;
-        let squared_radius = disc.radius * disc.radius;
-        let reach = (squared_radius * a / determinant).sqrt();
-        for row in middles_between(disc.y - reach, disc.y + reach, self.height) {
-            let y = row as f32 + 0.5 - disc.y;
-            let half = (a * squared_radius - determinant * y * y).max(0.0).sqrt() / a;
-            let middle = disc.x - b * y / a;
-            let columns = middles_between(middle - half, middle + half, self.width);
+        for (row, columns) in disc.covered(self.width, self.height) {
             let first = disc.height_at(columns.start, row);
             let span = row * self.width + columns.start..row * self.width + columns.end;
             let pixels = self.highest[span.clone()].iter_mut().zip(&mut self.lowest[span]);
@@ -105,9 +122,98 @@ impl DepthBuffer {
 
 /// The pixels of `0..n` whose middles are in `low..=high`.
 #[inline]
-fn middles_between(low: f32, high: f32, n: usize) -> std::ops::Range<usize> {
+fn middles_between(low: f32, high: f32, n: usize) -> Range<usize> {
     // Casts saturate: what is left of the picture becomes 0, and what is not a number too.
     let start = (low + 0.5) as usize;
     let end = ((high + 0.5) as usize).min(n);
     start.min(end)..end
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn disc(x: f32, y: f32, height: f32, radius: f32, slope: [f32; 2]) -> Disc {
+        let [a, b] = slope;
+        Disc {
+            x,
+            y,
+            height,
+            slope,
+            radius,
+            ellipse: [1.0 + a * a, a * b, 1.0 + b * b],
+            tolerance: 0.1,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn each_pixel_whose_middle_is_covered_gets_the_height_of_the_plane(
+            (x, y) in (-3.0_f32..23.0, -3.0_f32..19.0),
+            radius in 0.0_f32..9.0,
+            slope in (-4.0_f32..4.0, -4.0_f32..4.0),
+        ) {
+            let disc = disc(x, y, 7.0, radius, slope.into());
+            let mut buffer = DepthBuffer::default();
+            buffer.clear(20, 16);
+            buffer.draw(&disc);
+            for row in 0..16 {
+                for column in 0..20 {
+                    let (dx, dy) = (column as f32 + 0.5 - x, row as f32 + 0.5 - y);
+                    let rise = slope.0 * dx + slope.1 * dy;
+                    let squared = dx * dx + dy * dy + rise * rise;
+                    let found = (buffer.highest[row * 20 + column], buffer.lowest[row * 20 + column]);
+                    if squared < 0.999 * radius * radius - 1e-3 {
+                        prop_assert!((found.0 - 7.0 - rise).abs() < 1e-3 && found.0 == found.1, "{found:?}");
+                    } else if squared > 1.001 * radius * radius + 1e-3 {
+                        prop_assert_eq!(found, (f32::NEG_INFINITY, f32::INFINITY));
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn a_plane_hides_none_of_its_discs(
+            places in prop::collection::vec((0.0_f32..20.0, 0.0_f32..16.0), 1..60),
+            slope in (-4.0_f32..4.0, -4.0_f32..4.0),
+        ) {
+            let discs: Vec<Disc> =
+                places.iter().map(|&(x, y)| disc(x, y, slope.0 * x + slope.1 * y, 3.0, slope.into())).collect();
+            let mut buffer = DepthBuffer::default();
+            buffer.clear(20, 16);
+            discs.iter().for_each(|disc| buffer.draw(disc));
+            prop_assert!(discs.iter().all(|disc| buffer.sees(disc) == (true, true)));
+        }
+    }
+
+    #[test]
+    fn what_is_behind_is_seen_from_behind() {
+        let mut buffer = DepthBuffer::default();
+        buffer.clear(20, 20);
+        let front = disc(10.0, 10.0, 1.0, 6.0, [0.0; 2]);
+        let back = disc(10.0, 10.0, 0.0, 6.0, [0.0; 2]);
+        buffer.draw(&front);
+        buffer.draw(&back);
+        assert_eq!(
+            (buffer.sees(&front), buffer.sees(&back)),
+            ((true, false), (false, true))
+        );
+        // Heights within the tolerance are of one surface.
+        let same = Disc { height: 0.95, ..front };
+        assert_eq!(buffer.sees(&same), (true, false));
+    }
+
+    #[test]
+    fn a_hole_narrower_than_a_disc_shows_nothing() {
+        let mut buffer = DepthBuffer::default();
+        buffer.clear(30, 30);
+        let back = disc(15.2, 15.2, 0.0, 4.0, [0.0; 2]);
+        for x in [7.0, 23.0] {
+            buffer.draw(&disc(x, 15.0, 1.0, 7.5, [0.0; 2]));
+        }
+        buffer.draw(&back);
+        assert_eq!(buffer.sees(&back), (false, true));
+    }
 }

@@ -85,3 +85,44 @@ fn sum_of<const N: usize>(n: usize, terms: impl Fn(usize) -> [i128; N] + Sync) -
         .fold(|| [0; N], |sums, point| add(sums, terms(point)))
         .reduce(|| [0; N], add)
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, Vec3};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Positions in their frame.
+    fn in_frame(positions: &[DVec3]) -> Vec<DVec3> {
+        let positions = positions.iter().map(|position| position.as_vec3()).collect();
+        let cloud = PointCloud::new(DVec3::ZERO, positions).unwrap();
+        let frame = Frame::of(&cloud);
+        let to_frame = |position: &Vec3| frame.frame_from_cloud * (position.as_dvec3() - frame.center);
+        cloud.positions().iter().map(to_frame).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn it_turns_and_moves_with_the_cloud(
+            points in prop::collection::vec((0.0..1.0_f64, 0.0..1.0_f64, 0.0..1.0_f64), 20..100),
+            axis in (-1.0..1.0_f64, -1.0..1.0_f64, 0.1..1.0_f64),
+            angle in 0.0..6.0_f64,
+        ) {
+            // Unequal lengths, and more points at one end of each axis.
+            let points: Vec<DVec3> = points
+                .into_iter()
+                .map(|(x, y, z)| DVec3::new(9.0 * x * x * x, 3.0 * y * y * y, z * z * z))
+                .collect();
+            let rotation = DQuat::from_axis_angle(DVec3::from(axis).try_normalize().unwrap(), angle);
+            let moved: Vec<DVec3> = points.iter().map(|&point| rotation * point + DVec3::splat(2.0)).collect();
+            let same = |a: &DVec3, b: &DVec3| (*a - *b).abs().max_element() < 1e-3;
+            prop_assert!(in_frame(&points).iter().zip(&in_frame(&moved)).all(|(a, b)| same(a, b)));
+        }
+    }
+
+    #[test]
+    fn one_place_has_the_axes_of_the_cloud() {
+        assert_eq!(in_frame(&[DVec3::ONE; 3]), [DVec3::ZERO; 3]);
+    }
+}

@@ -127,3 +127,45 @@ fn project(view_from_frame: Mat3, place: Vec3, half: f32, splat: &Splat) -> Opti
     };
     Some((disc, facing / Vec3::new(u, v, 1.0).length()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Silent, shapes};
+
+    /// The pull on each outward normal of a ball around `center`, as seen from `places`.
+    fn pulls(center: DVec3, places: &[DVec3]) -> Vec<f32> {
+        let shape = shapes::sphere(20_000);
+        let cloud = PointCloud::new(center, shape.positions).unwrap();
+        // Six of 20 000 points on the unit sphere.
+        let radii = vec![(4.0 * 6.0 / 20_000.0_f32).sqrt(); 20_000];
+        let evidence = inside_views(&cloud, &radii, &shape.normals, places, &Silent).unwrap();
+        assert_eq!(evidence.origins(), [Origin::InsideViews]);
+        evidence.votes().iter().map(|vote| vote.pull()).collect()
+    }
+
+    #[test]
+    fn all_of_a_ball_is_seen_from_its_middle() {
+        let center = DVec3::new(512_000.0, 5.0, -7.0);
+        assert!(pulls(center, &[center]).iter().all(|&pull| pull == -1.0));
+        let off_center = center + DVec3::new(0.4, -0.2, 0.1);
+        assert!(pulls(center, &[off_center]).iter().all(|&pull| pull < -0.5));
+    }
+
+    #[test]
+    fn the_near_side_of_a_ball_is_seen_from_outside() {
+        let pulls = pulls(DVec3::ZERO, &[DVec3::new(0.0, 0.0, 5.0)]);
+        for (pull, position) in pulls.iter().zip(shapes::sphere(20_000).positions) {
+            match position.z {
+                ..0.2 => assert_eq!(*pull, 0.0, "{position}"),
+                0.6.. => assert!(*pull > 0.5, "{position} {pull}"),
+                _ => assert!(*pull >= 0.0, "{position} {pull}"),
+            }
+        }
+    }
+
+    #[test]
+    fn no_place_sees_nothing() {
+        assert!(pulls(DVec3::ZERO, &[]).iter().all(|&pull| pull == 0.0));
+    }
+}

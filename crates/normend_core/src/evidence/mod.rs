@@ -1,11 +1,13 @@
 //! What is known of the side that each normal should point to, and how sure that is.
 //!
 //! An [`Evidence`] has a vote for each point: its normal points to the side that was seen, or away from it. Votes come from
-//! views from outside ([`outside_views`]), from the places of the scanner ([`scanner`]) or from normals that came with the
-//! file ([`given`]). All are of one kind, so that they add up and whoever weighs them need not know where they are from.
+//! views from outside ([`outside_views`]), from counting the sheets that lines cross ([`crossings`]), from the places of the
+//! scanner ([`scanner`]) or from normals that came with the file ([`given`]). All are of one kind, so that they add up and
+//! whoever weighs them need not know where they are from.
 //!
 //! Invariant: votes are whole numbers of 1/[`UNIT`], so no sum of them depends on the order of points or threads.
 
+mod crossings;
 mod depth_buffer;
 mod frame;
 mod given;
@@ -15,8 +17,10 @@ mod outside_views;
 mod scanner;
 mod scene;
 
+use fixedbitset::FixedBitSet;
 use glam::Vec3;
 
+pub use crossings::{crossing_axes, crossings};
 pub use given::given;
 pub use inside_places::inside_places;
 pub use inside_views::inside_views;
@@ -51,13 +55,21 @@ pub enum Origin {
     InsideViews,
     /// Measured by a scanner whose place is known.
     Scanner,
+    /// Between an odd and an even number of sheets along lines through the cloud.
+    Crossings,
     /// A normal that came with the file.
     Given,
 }
 
 impl Origin {
     /// All origins, in the order of lists.
-    pub const ALL: [Self; 4] = [Self::OutsideViews, Self::InsideViews, Self::Scanner, Self::Given];
+    pub const ALL: [Self; 5] = [
+        Self::OutsideViews,
+        Self::InsideViews,
+        Self::Scanner,
+        Self::Crossings,
+        Self::Given,
+    ];
 
     /// The name in reports.
     pub fn name(self) -> &'static str {
@@ -65,6 +77,7 @@ impl Origin {
             Self::OutsideViews => "outside-views",
             Self::InsideViews => "inside-views",
             Self::Scanner => "scanner",
+            Self::Crossings => "crossings",
             Self::Given => "given",
         }
     }
@@ -135,6 +148,13 @@ impl Evidence {
     /// Where the votes come from, ascending.
     pub fn origins(&self) -> &[Origin] {
         &self.origins
+    }
+
+    /// Makes the votes those for normals of which some are turned, by point.
+    pub(crate) fn turn(&mut self, turned: &FixedBitSet) {
+        for point in turned.ones() {
+            self.votes[point].signed = -self.votes[point].signed;
+        }
     }
 
     /// Adds the votes of `other`, about the same `n` normals.

@@ -28,6 +28,10 @@ const TOLERANCE: f32 = 0.6;
 /// Cosine of the angle from which on a disc hides nothing: edges of thin sheets are no surface.
 const LEAST_DRAWN: f32 = 0.1;
 
+/// A point is an outlier that is so many times as far from the center as all but one in a hundred. Outliers are not looked at:
+/// a picture that reached to them would show the rest too small.
+const OUTLIER: f32 = 3.0;
+
 /// One point as a disc, in the frame.
 #[derive(Clone, Copy)]
 pub(super) struct Splat {
@@ -58,6 +62,8 @@ pub(super) struct Scene {
     pub frame: Frame,
     /// Median spacing.
     pub spacing: f32,
+    /// Distance from the center within which points set the size of pictures.
+    pub reach: f32,
 }
 
 /// By splat, one bit each: seen in front, seen from behind.
@@ -102,16 +108,26 @@ impl Scene {
                 spacing: SPACING_OF_SIXTH * radii[id as usize],
             })
             .collect();
-        let mut sorted = radii.to_vec();
-        let middle = sorted.len() / 2;
-        let median = *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let rank = |values: &mut [f32], share: f32| {
+            let index = ((values.len() - 1) as f32 * share) as usize;
+            *values.select_nth_unstable_by(index, f32::total_cmp).1
+        };
+        let median = rank(&mut radii.to_vec(), 0.5);
+        let mut distances: Vec<f32> = positions.par_iter().map(|position| position.length()).collect();
+        let reach = OUTLIER * rank(&mut distances, 0.99);
         Self {
             splats,
             ids,
             cloud_from_frame: frame_from_cloud.transpose(),
             frame,
             spacing: SPACING_OF_SIXTH * median,
+            reach,
         }
+    }
+
+    /// The point ids of the splats.
+    pub fn into_ids(self) -> Vec<u32> {
+        self.ids
     }
 
     /// Most pixels of a picture: surfaces that fill it need about four a point, and outliers must not cost memory.
@@ -241,5 +257,33 @@ fn transpose(rows: &mut [u64; 64]) {
         }
         size /= 2;
         low ^= low << size;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn bits_are_transposed(rows in prop::collection::vec(any::<u64>(), 64)) {
+            let mut transposed: [u64; 64] = rows.clone().try_into().unwrap();
+            transpose(&mut transposed);
+            for (row, bits) in rows.iter().enumerate() {
+                for (column, other) in transposed.iter().enumerate() {
+                    prop_assert_eq!(bits >> column & 1, other >> row & 1);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_curve_keeps_neighbors_together() {
+        let near = curve(Vec3::splat(10.0)).abs_diff(curve(Vec3::splat(11.0)));
+        let far = curve(Vec3::splat(10.0)).abs_diff(curve(Vec3::splat(-400.0)));
+        assert!(near < 64 && far > 1 << 24, "{near} {far}");
+        assert!(curve(Vec3::splat(CURVE_CELLS)) < 1 << 30);
     }
 }

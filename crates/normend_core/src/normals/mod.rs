@@ -13,6 +13,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 pub use obne::obne;
+pub(crate) use pca::fit as plane_of_least_squares;
 pub use pca::pca;
 pub use rrht::rrht;
 pub use wpca::wpca;

@@ -22,7 +22,7 @@ pub fn pca(
 }
 
 /// The normal of the plane of least squared distance to a point and its neighbors at `offsets`.
-pub(super) fn fit(offsets: &[DVec3]) -> DVec3 {
+pub(crate) fn fit(offsets: &[DVec3]) -> DVec3 {
     // The point itself has offset zero.
     let mean = offsets.iter().sum::<DVec3>() / (offsets.len() + 1) as f64;
     let mut scatter = Symmetric3::default();

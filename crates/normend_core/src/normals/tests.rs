@@ -25,7 +25,12 @@ fn a_plane_has_its_normal() {
         for found in estimate_all(&positions, 8, estimator) {
             // A few triples, some of them narrow, do not average the rounding of positions as all neighbors do.
             let tolerance = if estimator == Estimator::Rrht { 1e-4 } else { 1e-5 };
-            assert!(angle(found, normal) < tolerance, "{} {}", estimator.name(), angle(found, normal));
+            assert!(
+                angle(found, normal) < tolerance,
+                "{} {}",
+                estimator.name(),
+                angle(found, normal)
+            );
         }
     }
 }
@@ -190,9 +195,15 @@ fn rrht_keeps_an_edge_that_pca_rounds() {
         .collect();
     let worst = |estimator: Estimator, k| {
         let normals = estimate_all(&positions, k, estimator);
-        let near_edge = (0..positions.len()).filter(|&i| positions[i].z > -3.0 && (10.0..60.0).contains(&positions[i].x));
+        let near_edge =
+            (0..positions.len()).filter(|&i| positions[i].z > -3.0 && (10.0..60.0).contains(&positions[i].x));
         near_edge
-            .map(|i| angle(normals[i], Vec3::new(0.0, if positions[i].y > 0.0 { 1.0 } else { -1.0 }, 1.0)))
+            .map(|i| {
+                angle(
+                    normals[i],
+                    Vec3::new(0.0, if positions[i].y > 0.0 { 1.0 } else { -1.0 }, 1.0),
+                )
+            })
             .fold(0.0, f32::max)
     };
     assert!(worst(Estimator::Pca, 24) > 0.3, "{}", worst(Estimator::Pca, 24));

@@ -1,13 +1,15 @@
 //! Parameters by name.
 
-use super::SourceRule;
+use super::{Method, SourceRule};
 use crate::{Estimator, Parameters};
 
 /// A whole method: parameters that belong together, each of which can still be set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Preset {
-    /// OBNE, one default source a component, MMST.
+    /// Signed agglomeration with evidence: the automatic method.
     #[default]
+    Auto,
+    /// OBNE, one default source a component, MMST.
     Tree,
     /// The paper whole: WPCA → OBNE → sources by visibility votes → MMST (Liu et al. §3).
     Paper,
@@ -15,11 +17,12 @@ pub enum Preset {
 
 impl Preset {
     /// All presets, in the order of menus.
-    pub const ALL: [Self; 2] = [Self::Tree, Self::Paper];
+    pub const ALL: [Self; 3] = [Self::Auto, Self::Tree, Self::Paper];
 
     /// The name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Auto => "auto",
             Self::Tree => "tree",
             Self::Paper => "paper",
         }
@@ -28,6 +31,7 @@ impl Preset {
     /// The name in menus.
     pub fn label(self) -> &'static str {
         match self {
+            Self::Auto => "Automatic",
             Self::Tree => "Spanning tree",
             Self::Paper => "Paper",
         }
@@ -37,6 +41,10 @@ impl Preset {
     pub fn parameters(self) -> Parameters {
         let tree = Parameters::TREE;
         match self {
+            Self::Auto => Parameters {
+                method: Method::Agglomeration,
+                ..tree
+            },
             Self::Tree => tree,
             Self::Paper => Parameters {
                 estimator: Estimator::Obne,

@@ -312,7 +312,12 @@ fn voted_sources_decide_the_sides() {
         let comparison = metrics::compare(&cloud, &shape.normals, &oriented, &Silent).unwrap();
         // Corners of the bounding box see a little of the tube's inside through the hole.
         let n_allowed = if is_voted { 100 } else { 0 };
-        assert!(comparison.n_wrong <= n_allowed, "{}: {}", preset.name(), comparison.n_wrong);
+        assert!(
+            comparison.n_wrong <= n_allowed,
+            "{}: {}",
+            preset.name(),
+            comparison.n_wrong
+        );
     }
 }
 
