@@ -182,7 +182,11 @@ fn the_paper_is_a_preset_that_flags_change() {
     let folder = folder();
     fs::write(folder.path().join("scan.ply"), ply_of(&sphere(2000))).unwrap();
     let check = |typed: &str, sources: &str, eta: f64, is_voted: bool| {
-        let oriented = run(&folder, &format!("orient scan.ply -o out.ply --overwrite --json - {typed}")).expect(0);
+        let oriented = run(
+            &folder,
+            &format!("orient scan.ply -o out.ply --overwrite --json - {typed}"),
+        )
+        .expect(0);
         let report = oriented.json();
         assert_eq!(report["parameters"]["sources"], sources, "{typed}");
         assert_eq!(report["parameters"]["eta"], eta, "{typed}");
@@ -194,8 +198,18 @@ fn the_paper_is_a_preset_that_flags_change() {
     };
     check("--preset tree", "highest", 0.07, false);
     check("--preset paper", "hidden-points", 0.07, true);
-    check("--preset paper --sources hidden-points-mended --eta 0.2", "hidden-points-mended", 0.2, true);
-    check("--preset tree --sources hidden-points --views 14 --estimator rrht", "hidden-points", 0.07, true);
+    check(
+        "--preset paper --sources hidden-points-mended --eta 0.2",
+        "hidden-points-mended",
+        0.2,
+        true,
+    );
+    check(
+        "--preset tree --sources hidden-points --views 14 --estimator rrht",
+        "hidden-points",
+        0.07,
+        true,
+    );
     check("--preset paper --sources highest", "highest", 0.07, false);
 }
 

@@ -159,24 +159,22 @@ impl Scene {
         let positions = session.document.cloud().positions();
         let selected: &BTreeSet<u32> = &session.selected;
         let sources = session.document.sources();
-        let own = sources
-            .iter()
-            .filter_map(|source| {
-                let color = if session.document.is_flipped(source) {
-                    theme::SOURCE_FLIPPED
-                } else {
-                    theme::SOURCE_KEPT
-                };
-                let center = *positions.get(source.point as usize)?;
-                Some((
-                    source.point,
-                    Sphere {
-                        center,
-                        color,
-                        selected: selected.contains(&source.point),
-                    },
-                ))
-            });
+        let own = sources.iter().filter_map(|source| {
+            let color = if session.document.is_flipped(source) {
+                theme::SOURCE_FLIPPED
+            } else {
+                theme::SOURCE_KEPT
+            };
+            let center = *positions.get(source.point as usize)?;
+            Some((
+                source.point,
+                Sphere {
+                    center,
+                    color,
+                    selected: selected.contains(&source.point),
+                },
+            ))
+        });
         let voted = session
             .document
             .propagation()

@@ -194,41 +194,51 @@ fn start_row(ui: &mut Ui, draft: &mut Parameters, has_normals: bool) {
 }
 
 fn preset_row(ui: &mut Ui, draft: &mut Parameters) {
-    theme::input_row(ui, "Preset", "A whole method; what is set below replaces parts of it", |ui| {
-        let present = Preset::of(draft);
-        ComboBox::from_id_salt("preset")
-            .selected_text(present.map_or("Set by hand", Preset::label))
-            .show_ui(ui, |ui| {
-                for each in Preset::ALL {
-                    if ui.selectable_label(present == Some(each), each.label()).clicked() {
-                        *draft = Parameters {
-                            start: draft.start,
-                            ..each.parameters()
-                        };
+    theme::input_row(
+        ui,
+        "Preset",
+        "A whole method; what is set below replaces parts of it",
+        |ui| {
+            let present = Preset::of(draft);
+            ComboBox::from_id_salt("preset")
+                .selected_text(present.map_or("Set by hand", Preset::label))
+                .show_ui(ui, |ui| {
+                    for each in Preset::ALL {
+                        if ui.selectable_label(present == Some(each), each.label()).clicked() {
+                            *draft = Parameters {
+                                start: draft.start,
+                                ..each.parameters()
+                            };
+                        }
                     }
-                }
-            })
-            .response
-    });
+                })
+                .response
+        },
+    );
 }
 
 /// Who vouches for the first signs, and how many look.
 fn source_rows(ui: &mut Ui, draft: &mut Parameters) {
     let votes = draft.start == Start::Estimate;
-    theme::input_row(ui, "First sources", "Who says which side is right, before you do", |ui| {
-        let combo = ComboBox::from_id_salt("sources").selected_text(draft.sources.label());
-        let show = |ui: &mut Ui| {
-            combo
-                .show_ui(ui, |ui| {
-                    for each in SourceRule::ALL {
-                        ui.selectable_value(&mut draft.sources, each, each.label());
-                    }
-                })
-                .response
-        };
-        let response = ui.add_enabled_ui(votes, show).inner;
-        response.on_disabled_hover_text("The normals of the file say it")
-    });
+    theme::input_row(
+        ui,
+        "First sources",
+        "Who says which side is right, before you do",
+        |ui| {
+            let combo = ComboBox::from_id_salt("sources").selected_text(draft.sources.label());
+            let show = |ui: &mut Ui| {
+                combo
+                    .show_ui(ui, |ui| {
+                        for each in SourceRule::ALL {
+                            ui.selectable_value(&mut draft.sources, each, each.label());
+                        }
+                    })
+                    .response
+            };
+            let response = ui.add_enabled_ui(votes, show).inner;
+            response.on_disabled_hover_text("The normals of the file say it")
+        },
+    );
     if votes && draft.sources != SourceRule::Highest {
         theme::input_row(ui, "Viewpoints", "8 are the corners of the bounding box", |ui| {
             ui.add(DragValue::new(&mut draft.views).range(VIEWS).speed(0.1))

@@ -19,7 +19,10 @@ pub fn ui(ui: &mut Ui, session: &mut Session) -> Option<Action> {
     let reveal = session.reveal.take();
     let session = &*session;
     let sources = session.document.sources();
-    let n_voted = session.document.propagation().map_or(0, |propagation| propagation.voted_sources.len());
+    let n_voted = session
+        .document
+        .propagation()
+        .map_or(0, |propagation| propagation.voted_sources.len());
     if n_voted > 0 {
         let voted = theme::counted(n_voted as u64, "source", "sources");
         ui.label(RichText::new(format!("{voted} voted for by viewpoints")).weak())

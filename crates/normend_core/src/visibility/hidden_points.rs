@@ -79,10 +79,9 @@ impl HiddenPoints {
 
     /// The images of the spherical flip around `viewpoint`, relative to it, and at last the viewpoint itself.
     fn flipped(&self, viewpoint: DVec3) -> Vec<DVec3> {
-        let farthest = self
-            .positions
-            .iter()
-            .fold(0.0, |farthest: f64, &position| farthest.max((position - viewpoint).length()));
+        let farthest = self.positions.iter().fold(0.0, |farthest: f64, &position| {
+            farthest.max((position - viewpoint).length())
+        });
         let diameter = 2.0 * RADIUS * farthest;
         let flip = |&position: &DVec3| {
             let offset = position - viewpoint;
@@ -153,7 +152,9 @@ mod tests {
             towards.normalize_or_zero().dot(shape.normals[point])
         };
         let n_right = seen.ones().filter(|&point| facing(point) > -0.2).count();
-        let clear: Vec<usize> = (0..shape.positions.len()).filter(|&point| facing(point) > 0.5).collect();
+        let clear: Vec<usize> = (0..shape.positions.len())
+            .filter(|&point| facing(point) > 0.5)
+            .collect();
         let n_covered = clear.iter().filter(|&&point| seen.contains(point)).count();
         (
             n_right as f64 / seen.count_ones(..) as f64,
@@ -206,7 +207,9 @@ mod tests {
     #[test]
     fn nothing_to_see() {
         assert_eq!(visible_points(&cloud(Vec::new()), DVec3::X, 0.0).count_ones(..), 0);
-        let plane = (0..100).map(|i| Vec3::new((i % 10) as f32, (i / 10) as f32, 0.0)).collect();
+        let plane = (0..100)
+            .map(|i| Vec3::new((i % 10) as f32, (i / 10) as f32, 0.0))
+            .collect();
         assert_eq!(visible_points(&cloud(plane), DVec3::X * 30.0, 0.0).count_ones(..), 0);
         let place = vec![Vec3::ONE; 7];
         assert_eq!(visible_points(&cloud(place), DVec3::ONE, 0.0).count_ones(..), 0);

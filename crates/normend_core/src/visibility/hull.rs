@@ -335,7 +335,10 @@ mod tests {
                 volume(a, b, c, point) == 0.0
             });
             // A corner that is no vertex would be strictly outside; one that is none may still be on the surface.
-            assert!(is_vertex || !on_surface || !is_corner(points, id), "corner {id} is missing");
+            assert!(
+                is_vertex || !on_surface || !is_corner(points, id),
+                "corner {id} is missing"
+            );
         }
     }
 
@@ -345,7 +348,9 @@ mod tests {
         shape.normals.iter().any(|direction| {
             let reach = direction.as_dvec3().dot(points[id]);
             let others = points.iter().filter(|&&other| other != points[id]);
-            others.into_iter().all(|other| direction.as_dvec3().dot(*other) < reach - 1e-9)
+            others
+                .into_iter()
+                .all(|other| direction.as_dvec3().dot(*other) < reach - 1e-9)
         })
     }
 
@@ -393,7 +398,11 @@ mod tests {
         check(&[]);
         check(&[DVec3::ONE; 9]);
         check(&(0..9).map(|i| DVec3::ONE * f64::from(i)).collect::<Vec<_>>());
-        check(&(0..9).map(|i| DVec3::new(f64::from(i), f64::from(i * i), 3.0)).collect::<Vec<_>>());
+        check(
+            &(0..9)
+                .map(|i| DVec3::new(f64::from(i), f64::from(i * i), 3.0))
+                .collect::<Vec<_>>(),
+        );
     }
 
     #[test]

@@ -110,9 +110,9 @@ pub fn sources(votes: &[Vote], normals: &[Vec3], rule: SourceRule, eta: f32) -> 
         let weakest = *strengths.select_nth_unstable_by(last, f32::total_cmp).1;
         Box::new(move |vote| real(&vote) && vote.sum.abs() >= weakest)
     } else {
-        let ends = votes
-            .iter()
-            .fold((0.0, 0.0), |(min, max): (f32, f32), vote| (min.min(vote.sum), max.max(vote.sum)));
+        let ends = votes.iter().fold((0.0, 0.0), |(min, max): (f32, f32), vote| {
+            (min.min(vote.sum), max.max(vote.sum))
+        });
         Box::new(move |vote| {
             (vote.sum < 0.0 && vote.sum <= ends.0 + eta) || (vote.sum > 0.0 && vote.sum >= ends.1 - eta)
         })
@@ -199,7 +199,9 @@ fn noise(cloud: &PointCloud, neighbors: &Neighbors, k: usize, normals: &[Vec3]) 
                 .iter()
                 .map(|&neighbor| (positions[neighbor as usize] - positions[point]).dot(normals[point]));
             // The point itself has height 0.
-            let (sum, squares) = heights.fold((0.0, 0.0), |(sum, squares), height| (sum + height, squares + height * height));
+            let (sum, squares) = heights.fold((0.0, 0.0), |(sum, squares), height| {
+                (sum + height, squares + height * height)
+            });
             let n = (k + 1) as f32;
             ((squares - sum * sum / n).max(0.0) / n).sqrt()
         })
@@ -240,7 +242,10 @@ mod tests {
         let corners = (0..8).map(|corner| {
             let side = |bit: i32| if corner >> bit & 1 == 0 { -1.0 } else { 1.0 };
             let viewpoint = center + Vec3::new(side(0), side(1), side(2)) * 0.5 * (max - min);
-            (viewpoint, super::super::visible_points(&cloud, viewpoint.as_dvec3(), 0.0))
+            (
+                viewpoint,
+                super::super::visible_points(&cloud, viewpoint.as_dvec3(), 0.0),
+            )
         });
         let corners: Vec<_> = corners.collect();
         for (point, vote) in votes.iter().enumerate() {
@@ -255,7 +260,11 @@ mod tests {
                 }
             }
             // The little noise that is allowed for lets a few more see the point from the side, which weighs next to nothing.
-            assert!((f64::from(vote.sum) - expect).abs() < 0.05, "{point}: {} {expect}", vote.sum);
+            assert!(
+                (f64::from(vote.sum) - expect).abs() < 0.05,
+                "{point}: {} {expect}",
+                vote.sum
+            );
             assert!(vote.weight >= vote.sum.abs());
         }
     }
@@ -277,10 +286,7 @@ mod tests {
 
     #[test]
     fn the_papers_sources_are_the_two_ends() {
-        let vote = |sum: f32| Vote {
-            sum,
-            weight: sum.abs(),
-        };
+        let vote = |sum: f32| Vote { sum, weight: sum.abs() };
         let votes: Vec<Vote> = [-1.0, -0.95, -0.8, -0.0, 0.0, 0.4, 0.45, 0.5].map(vote).to_vec();
         let normals = vec![Vec3::Z; votes.len()];
         let of = |eta| -> Vec<(u32, f32)> {
@@ -290,7 +296,10 @@ mod tests {
         assert_eq!(of(0.0), [(0, 1.0), (7, -1.0)]);
         assert_eq!(of(0.07), [(0, 1.0), (1, 1.0), (6, -1.0), (7, -1.0)]);
         // Nobody sees the points without a vote, however wide the ends are.
-        assert_eq!(of(1.0).iter().map(|source| source.0).collect::<Vec<_>>(), [0, 1, 2, 5, 6, 7]);
+        assert_eq!(
+            of(1.0).iter().map(|source| source.0).collect::<Vec<_>>(),
+            [0, 1, 2, 5, 6, 7]
+        );
     }
 
     #[test]
@@ -334,7 +343,11 @@ mod tests {
             for rule in [SourceRule::HiddenPoints, SourceRule::HiddenPointsMended] {
                 let viewpoints = viewpoints(&cloud, rule, views);
                 assert_eq!(viewpoints.len(), views);
-                let n_distinct = viewpoints.iter().enumerate().filter(|(i, v)| !viewpoints[..*i].contains(v)).count();
+                let n_distinct = viewpoints
+                    .iter()
+                    .enumerate()
+                    .filter(|(i, v)| !viewpoints[..*i].contains(v))
+                    .count();
                 assert_eq!(n_distinct, views);
             }
         }

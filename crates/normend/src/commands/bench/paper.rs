@@ -236,7 +236,9 @@ fn purities(
         let votes = visibility::votes(cloud, &neighbors, k_normals, &stored, rule, views, progress)?;
         for (eta, purity) in ETAS.into_iter().zip(by_eta) {
             let sources = visibility::sources(&votes, &stored, rule, eta);
-            let judged = sources.iter().filter(|source| right[source.point as usize] != Vec3::ZERO);
+            let judged = sources
+                .iter()
+                .filter(|source| right[source.point as usize] != Vec3::ZERO);
             let is_right = |source: &&normend_core::Source| source.normal.dot(right[source.point as usize]) > 0.0;
             purity.sources = judged.clone().count();
             purity.right = judged.filter(is_right).count();
@@ -256,7 +258,10 @@ fn write_tables(text: &mut String, clouds: &[Measured]) {
     let method_names = || METHODS.iter().map(|method| method.name);
 
     // Writing to a string does not fail, here and below.
-    let _ = writeln!(text, "\n### Wrong share by class, mean and median (after Fig. 6 and 14)\n");
+    let _ = writeln!(
+        text,
+        "\n### Wrong share by class, mean and median (after Fig. 6 and 14)\n"
+    );
     header(text, ["class", "clouds"].into_iter().chain(method_names()));
     for class in &classes {
         let of_class = of_class(class);
@@ -269,8 +274,14 @@ fn write_tables(text: &mut String, clouds: &[Measured]) {
 
     let sharp = of_class("sharp");
     if !sharp.is_empty() {
-        let _ = writeln!(text, "\n### Wrong share of normal estimators, class sharp (after Fig. 6)\n");
-        header(text, ["cloud", "points"].into_iter().chain(method_names().take(N_ESTIMATORS)));
+        let _ = writeln!(
+            text,
+            "\n### Wrong share of normal estimators, class sharp (after Fig. 6)\n"
+        );
+        header(
+            text,
+            ["cloud", "points"].into_iter().chain(method_names().take(N_ESTIMATORS)),
+        );
         for cloud in sharp {
             let _ = write!(text, "| {} | {} |", cloud.name, cloud.points);
             for made in &cloud.made[..N_ESTIMATORS] {
@@ -292,7 +303,10 @@ fn write_tables(text: &mut String, clouds: &[Measured]) {
     let _ = writeln!(text, "\n### Number and purity of sources against eta (after Fig. 5)\n");
     let columns = |rule: &str| ETAS.map(|eta| format!("{rule}, {eta}"));
     let columns: Vec<String> = ["paper", "mended"].into_iter().flat_map(columns).collect();
-    header(text, ["class", "cloud"].into_iter().chain(columns.iter().map(String::as_str)));
+    header(
+        text,
+        ["class", "cloud"].into_iter().chain(columns.iter().map(String::as_str)),
+    );
     let mut write_row = |class: &str, name: &str, clouds: &[&Measured]| {
         let _ = write!(text, "| {class} | {name} |");
         for rule in 0..RULES.len() {
@@ -346,7 +360,9 @@ fn write_noise(text: &mut String, bar: &Bar) -> anyhow::Result<()> {
     );
     header(
         text,
-        ["displaced by"].into_iter().chain(METHODS.iter().map(|method| method.name)),
+        ["displaced by"]
+            .into_iter()
+            .chain(METHODS.iter().map(|method| method.name)),
     );
     for share in DISPLACEMENTS {
         let shape = octahedron(OCTAHEDRON_POINTS).displaced(share, 1);
