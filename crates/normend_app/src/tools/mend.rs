@@ -415,6 +415,7 @@ mod tests {
             sides: Vec::new(),
             patches: Some(Arc::new(Patches::new(&tree, &levels))),
             tree,
+            evidence: None,
             seconds: Vec::new(),
         });
         document

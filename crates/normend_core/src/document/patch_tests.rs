@@ -34,6 +34,7 @@ fn propagation(turned: [bool; 8]) -> Propagation {
         voted_sources: Arc::default(),
         sides: Vec::new(),
         patches: Some(Arc::new(Patches::new(&world.tree, &levels))),
+        evidence: None,
         seconds: Vec::new(),
     }
 }

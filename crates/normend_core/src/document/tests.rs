@@ -54,6 +54,7 @@ fn propagation_of(world: &World, normals: &[Vec3]) -> Propagation {
         sides: Vec::new(),
         patches: None,
         voted_sources: Arc::default(),
+        evidence: None,
         seconds: Vec::new(),
     }
 }

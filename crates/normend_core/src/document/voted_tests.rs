@@ -39,6 +39,7 @@ fn propagation(world: &World, voted: &Signs) -> Propagation {
         voted_sources: Arc::new(voted.iter().map(source).collect()),
         sides: Vec::new(),
         patches: None,
+        evidence: None,
         seconds: Vec::new(),
     }
 }
