@@ -9,7 +9,7 @@ mod sheets;
 #[cfg(test)]
 mod tests;
 
-use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicI64, AtomicUsize, Ordering::Relaxed};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -123,12 +123,16 @@ fn count(scene: &Scene, n_axes: usize, progress: &dyn Progress) -> Result<Vec<[T
         .collect();
     let steps = Steps::new(progress, views.len() * scene.splats.len());
     let mut bands = Bands::default();
+    let mut lanes: Vec<Lines> = (0..rayon::current_num_threads()).map(|_| Lines::default()).collect();
     for view in &views {
         bands.sort(scene, view);
-        (0..bands.n_bands())
-            .into_par_iter()
-            .with_max_len(1)
-            .try_for_each_init(Lines::default, |lines, band| {
+        let next = AtomicUsize::new(0);
+        lanes.par_iter_mut().with_max_len(1).try_for_each(|lines| {
+            loop {
+                let band = next.fetch_add(1, Relaxed);
+                if band >= bands.n_bands() {
+                    return Ok(());
+                }
                 let splats = bands.of(band);
                 lines.draw(scene, view, bands.rows(band), splats, &weights);
                 lines.vote();
@@ -139,8 +143,9 @@ fn count(scene: &Scene, n_axes: usize, progress: &dyn Progress) -> Result<Vec<[T
                         }
                     }
                 }
-                steps.advance(splats.len())
-            })?;
+                steps.advance(splats.len())?;
+            }
+        })?;
     }
     Ok(tallies)
 }

@@ -46,13 +46,13 @@ struct Hit {
     cosine: f32,
 }
 
-/// Hits from `first` to before the next sheet's.
+/// The hits of one sheet: those from the end of the sheet below.
 #[derive(Clone, Copy, Default)]
 struct Sheet {
     end: usize,
     quality: f32,
-    /// Product of the qualities of the sheets above.
-    above: f32,
+    /// Product of the qualities of the sheets before it, which are farther down.
+    before: f32,
 }
 
 /// The lines through one band: what they hit, and what that says of the discs. Reused from band to band.
@@ -160,15 +160,24 @@ impl Lines {
                     cosine: disc.cosine.abs(),
                 }
             }));
-            for (which, tolerance) in TOLERANCES.into_iter().enumerate() {
-                let mut sheets = [Sheet::default(); MOST_SHEETS];
-                if let Some(n_sheets) = group(&self.hits, tolerance, &mut sheets)
-                    && n_sheets % 2 == 0
-                {
-                    cast(&self.hits, &sheets[..n_sheets], &self.discs, |disc, vote| {
-                        self.votes[disc][which] += vote;
+            let n_sheets = count(&self.hits);
+            let mut which = 0;
+            while let Some(&n) = n_sheets.get(which) {
+                let mut end = which + 1;
+                if n % 2 == 0 && n <= MOST_SHEETS {
+                    let mut sheets = [Sheet::default(); MOST_SHEETS];
+                    let are_thin = group(&self.hits, TOLERANCES[which], &mut sheets);
+                    // What is thin for a tight tolerance is thin for a loose one: the same sheets vote the same.
+                    while are_thin && n_sheets.get(end) == Some(&n) {
+                        end += 1;
+                    }
+                    cast(&self.hits, &sheets[..n], &self.discs, |disc, vote| {
+                        for sum in &mut self.votes[disc][which..end] {
+                            *sum += vote;
+                        }
                     });
                 }
+                which = end;
             }
         }
     }
@@ -179,51 +188,69 @@ impl Lines {
     }
 }
 
-/// Groups hits, ascending, into sheets; their number, or `None` when there are too many.
-fn group(hits: &[Hit], tolerance: f32, sheets: &mut [Sheet; MOST_SHEETS]) -> Option<usize> {
-    let mut n_sheets = 0;
-    let mut above = 1.0;
-    let mut start = 0;
-    let (mut cosines, mut spacings) = (0.0, 0.0);
-    for (index, hit) in hits.iter().enumerate() {
-        cosines += hit.cosine;
-        spacings += hit.spacing;
-        if let Some(next) = hits.get(index + 1)
-            && next.height - hit.height <= tolerance * hit.spacing.max(next.spacing)
-        {
-            continue;
+/// Whether two hits that follow each other are of one sheet.
+#[inline]
+fn are_one(hit: &Hit, next: &Hit, tolerance: f32) -> bool {
+    next.height - hit.height <= tolerance * hit.spacing.max(next.spacing)
+}
+
+/// Number of sheets of hits, ascending, for each tolerance.
+fn count(hits: &[Hit]) -> [usize; TOLERANCES.len()] {
+    let mut n_sheets = [1; TOLERANCES.len()];
+    for pair in hits.windows(2) {
+        for (n, tolerance) in n_sheets.iter_mut().zip(TOLERANCES) {
+            *n += usize::from(!are_one(&pair[0], &pair[1], tolerance));
         }
-        let count = (index + 1 - start) as f32;
-        let thickness = (hit.height - hits[start].height) * count / spacings;
-        let thick = THICK * tolerance;
+    }
+    n_sheets
+}
+
+/// Groups hits, ascending, into `sheets`, which has room for them. Returns whether no sheet is thicker than one should be.
+fn group(hits: &[Hit], tolerance: f32, sheets: &mut [Sheet]) -> bool {
+    let thick = THICK * tolerance;
+    let mut are_thin = true;
+    let mut before = 1.0;
+    let mut start = 0;
+    for sheet in sheets {
+        let Some(first) = hits.get(start) else {
+            break;
+        };
+        let (mut cosines, mut spacings) = (0.0, 0.0);
+        let mut end = start;
+        loop {
+            cosines += hits[end].cosine;
+            spacings += hits[end].spacing;
+            end += 1;
+            if end == hits.len() || !are_one(&hits[end - 1], &hits[end], tolerance) {
+                break;
+            }
+        }
+        let count = (end - start) as f32;
+        let thickness = (hits[end - 1].height - first.height) * count / spacings;
+        are_thin &= thickness <= thick;
         let quality =
             smoothstep(cosines / count, STEEP[0], STEEP[1]) * (1.0 - smoothstep(thickness, thick, 2.0 * thick));
-        *sheets.get_mut(n_sheets)? = Sheet {
-            end: index + 1,
-            quality,
-            above,
-        };
-        n_sheets += 1;
-        above *= quality;
-        start = index + 1;
-        (cosines, spacings) = (0.0, 0.0);
+        *sheet = Sheet { end, quality, before };
+        before *= quality;
+        start = end;
     }
-    Some(n_sheets)
+    are_thin
 }
 
 /// Casts the votes of an even number of sheets, from the lowest on: the outward side of the first faces downward.
 fn cast(hits: &[Hit], sheets: &[Sheet], discs: &[Seen], mut vote: impl FnMut(usize, i64)) {
-    let mut below = 1.0;
+    let mut after = 1.0;
     for (index, sheet) in sheets.iter().enumerate().rev() {
         let start = if index == 0 { 0 } else { sheets[index - 1].end };
-        let quality = sheet.above.max(below) * sheet.quality;
-        below *= sheet.quality;
+        let quality = sheet.before.max(after) * sheet.quality;
+        after *= sheet.quality;
         if quality <= LEAST_QUALITY {
             continue;
         }
         for hit in &hits[start..sheet.end] {
             let disc = &discs[hit.seen as usize];
-            let weight = (quality * disc.weight).round() as i32;
+            // Rounds, as no weight is negative.
+            let weight = (quality * disc.weight + 0.5) as i32;
             let upward = index % 2 == 1;
             let signed = if (disc.cosine > 0.0) == upward { weight } else { -weight };
             vote(hit.seen as usize, Tally::packed(signed, weight));
