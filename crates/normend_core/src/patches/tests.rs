@@ -163,9 +163,9 @@ proptest! {
             if n_component > 1 {
                 prop_assert!(2 * default.n_points <= n_component);
             }
-            // No other part is weaker, and no equal one smaller.
+            // No other part is weaker for its size, and no equal one smaller.
             for patch in allowed.iter().filter(|patch| 2 * patch.n_points <= n_component) {
-                prop_assert!((default.strength, default.n_points) <= (patch.strength, patch.n_points));
+                prop_assert!(default.doubt() < patch.doubt() || (default.doubt() == patch.doubt() && default.n_points <= patch.n_points));
             }
             // Every allowed patch is less than a step away from an offered one.
             for patch in &allowed {
