@@ -309,6 +309,59 @@ fn a_broken_input_does_not_stop_the_others() {
 }
 
 #[test]
+fn orient_turns_a_ball_to_the_side_that_is_asked_for() {
+    let folder = folder();
+    let ball = sphere(3000);
+    fs::write(folder.path().join("ball.ply"), ply_of(&ball)).unwrap();
+    let inward: Vec<(Vec3, Vec3)> = ball.iter().map(|&(p, n)| (p, -n)).collect();
+    fs::write(folder.path().join("inward.ply"), ply_of(&inward)).unwrap();
+    // The table speaks of the first half only: the rest of the component follows it.
+    fs::write(
+        folder.path().join("places.tsv"),
+        "first\tcount\tx\ty\tz\n0\t1500\t0\t0\t0.1\n",
+    )
+    .unwrap();
+    let both_sides = "0 1500 0 0 9\n1500 1500 0 0 -9\n";
+    fs::write(folder.path().join("both_sides.tsv"), both_sides).unwrap();
+    let check = |input: &str, flags: &str, expect: u64| {
+        let oriented = run(
+            &folder,
+            &format!("orient {input} -o out.ply --overwrite -q --json - {flags}"),
+        )
+        .expect(0);
+        assert_eq!(oriented.json()["without_evidence"], 0, "{flags}");
+        assert_eq!(n_wrong(&folder, "out.ply", "ball.ply"), expect, "{flags}");
+    };
+    check("ball.ply", "", 0);
+    check("ball.ply", "--rule into-room", 3000);
+    check("ball.ply", "--scanner 0.1,0,-0.2", 3000);
+    check("ball.ply", "--sensors both_sides.tsv", 0);
+    check("ball.ply", "--sensors places.tsv", 3000);
+    check("ball.ply", "--sensors places.tsv --rule outward", 0);
+    check("inward.ply", "--rule given", 3000);
+    check("ball.ply", "--rule given", 0);
+}
+
+#[test]
+fn a_table_of_places_that_is_wrong_names_its_line() {
+    let folder = folder();
+    fs::write(folder.path().join("ball.ply"), ply_of(&sphere(300))).unwrap();
+    let orient = "orient ball.ply -o out.ply -q --sensors places.tsv";
+    run(&folder, orient)
+        .expect(1)
+        .expect_sentence(&["places.tsv", "no such file"]);
+    fs::write(
+        folder.path().join("places.tsv"),
+        "first count x y z\n0 200 0 0 0\n200 101 0 0 0\n",
+    )
+    .unwrap();
+    run(&folder, orient)
+        .expect(1)
+        .expect_sentence(&["places.tsv, line 3", "300", "another scan"]);
+    assert!(!folder.path().join("out.ply").exists());
+}
+
+#[test]
 fn wrong_use_is_refused_before_anything_is_written() {
     let folder = folder();
     let scan = ply_of(&sphere(300));
@@ -353,6 +406,20 @@ fn wrong_use_is_refused_before_anything_is_written() {
     check("orient a.ply -o out.ply --estimator best", &["pca", "wpca", "obne"]);
     check("orient a.ply -o out.ply --k-normals 2", &["3"]);
     check("orient a.ply -o out.ply --threads 0", &["1"]);
+    check("orient a.ply -o out.ply --rule inward", &["outward", "into-room"]);
+    check(
+        "orient a.ply -o out.ply --rule toward-scanner",
+        &["--scanner", "--sensors"],
+    );
+    check("orient a.ply -o out.ply --scanner 1,2", &["three numbers"]);
+    check(
+        "orient a.ply sub/b.ply -o out --sensors places.tsv",
+        &["--sensors", "one by one"],
+    );
+    check(
+        "orient a.ply -o out.ply --scanner 1,2,3 --sensors places.tsv",
+        &["cannot be used with"],
+    );
     check("render a.ply -o out.png --size 12", &["1280x800"]);
     check("render a.ply -o out.jpg", &[".png"]);
     check("render a.ply -o a.ply", &["take the place"]);
