@@ -39,8 +39,8 @@ pub struct Patch {
 }
 
 /// How much weaker a boundary has to be to make up for twice the points. What an agglomeration leaves wrong is mostly small, and
-/// a large patch that was right costs many clicks: in the tests with a simulated user this saved a third of the clicks and
-/// half of the steps of the wheel that weakness alone took. With thrice as much the default is hardly ever more than a point.
+/// a large patch that was right costs many clicks: with a simulated user this saved a quarter to a third of the clicks, and
+/// with the wheel a third to a half of its steps. With thrice as much the default is hardly ever more than a point.
 pub const STRENGTH_PER_DOUBLING: f32 = 0.035;
 
 /// Strengths are kept in 16 bits: what differs by less is the same for a choice between patches.
