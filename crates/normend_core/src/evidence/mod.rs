@@ -19,6 +19,7 @@ mod scene;
 
 use fixedbitset::FixedBitSet;
 use glam::Vec3;
+use rayon::prelude::*;
 
 pub use crossings::{crossing_axes, crossings};
 pub use given::given;
@@ -143,6 +144,12 @@ impl Evidence {
     /// `n` votes by point.
     pub fn votes(&self) -> &[Vote] {
         &self.votes
+    }
+
+    /// The share of points that have as much as a third of a look, in 0..=1.
+    pub fn share_known(&self) -> f64 {
+        let n_known = self.votes.par_iter().filter(|vote| vote.weight >= UNIT / 3).count();
+        n_known as f64 / self.votes.len().max(1) as f64
     }
 
     /// Where the votes come from, ascending.

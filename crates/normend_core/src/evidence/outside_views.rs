@@ -237,10 +237,10 @@ mod tests {
             let mut shape = kind.generate(20_000);
             for (point, normal) in shape.normals.iter_mut().enumerate() {
                 // Of any sign, as estimated ones are.
-                *normal *= if point % 2 == 0 { 1.0 } else { -1.0 };
+                *normal *= if point.is_multiple_of(2) { 1.0 } else { -1.0 };
             }
             let votes = votes(&shape);
-            let right = |point: usize| votes[point].pull() * if point % 2 == 0 { 1.0 } else { -1.0 };
+            let right = |point: usize| votes[point].pull() * if point.is_multiple_of(2) { 1.0 } else { -1.0 };
             let n_right = (0..votes.len()).filter(|&point| right(point) > 0.5).count();
             let n_wrong = (0..votes.len()).filter(|&point| right(point) < 0.0).count();
             assert!(

@@ -100,7 +100,8 @@ impl Scene {
             .map(|(id, &position)| (curve(position * cells), id))
             .collect();
         order.par_sort_unstable();
-        let ids: Vec<u32> = order.into_iter().map(|(_, id)| id).collect();
+        let ids: Vec<u32> = order.par_iter().map(|&(_, id)| id).collect();
+        drop(order);
         let splats = (ids.par_iter())
             .map(|&id| Splat {
                 position: positions[id as usize],
