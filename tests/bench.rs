@@ -266,3 +266,56 @@ fn the_papers_figures_need_clouds_and_replace_nothing() {
     assert!(err.contains("paper.md exists already"), "{err}");
     assert_eq!(fs::read_to_string(folder.path().join("paper.md")).unwrap(), "mine");
 }
+
+/// The rows of `bench clicks --clouds` for one cloud: user, clicks, steps, harmful, wrong before and after, regions left.
+fn clicks_of(table: &str, cloud: &str) -> Vec<(String, [usize; 6])> {
+    let rows = table.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
+    rows.filter(|words| words.get(1) == Some(&cloud))
+        .map(|words| {
+            let counts = words[3..].iter().map(|word| word.parse().unwrap()).collect::<Vec<_>>();
+            (words[2].to_owned(), counts.try_into().unwrap())
+        })
+        .collect()
+}
+
+#[test]
+fn a_simulated_user_mends_what_quality_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    run(&folder, "bench clouds d --only wedge_5", 0);
+    for preset in ["tree", "auto"] {
+        let (quality, _) = run(&folder, &format!("bench quality d --preset {preset} --json - -q"), 0);
+        let cloud = row(&json(&quality)["clouds"], "name", "wedge_5").clone();
+        assert!(
+            cloud["wrong_regions"].as_u64() > Some(0),
+            "nothing to click on: {cloud}"
+        );
+        let (table, _) = run(&folder, &format!("bench clicks d --preset {preset} --clouds -q"), 0);
+        assert!(table.contains("1 of 1 cloud with a wrong region"), "{table}");
+        let users = clicks_of(&table, "wedge_5");
+        let names: Vec<&str> = users.iter().map(|(user, _)| user.as_str()).collect();
+        assert_eq!(names, ["tree", "default", "wheel"]);
+        for (user, [clicks, steps, harmful, before, after, left]) in &users {
+            assert_eq!(Some(*before as u64), cloud["wrong"].as_u64());
+            assert!((1..=60).contains(clicks) && harmful <= clicks, "{user}: {table}");
+            assert!(*clicks == 60 || *left == 0, "{user} stopped early: {table}");
+            assert!(user == "wheel" || *steps == 0);
+            // Who sees what a click turns and can choose turns nothing for the worse.
+            assert!(
+                user != "wheel" || preset == "tree" || (*harmful == 0 && after < before),
+                "{table}"
+            );
+        }
+        // Without patches all mend along the tree.
+        assert!(preset == "auto" || users.iter().all(|(_, counts)| *counts == users[0].1));
+        assert!(
+            preset == "tree" || users[1].1 != users[0].1,
+            "no patch was offered: {table}"
+        );
+        let (again, _) = run(
+            &folder,
+            &format!("bench clicks d --preset {preset} --clouds -q --threads 1"),
+            0,
+        );
+        assert_eq!(clicks_of(&again, "wedge_5"), users);
+    }
+}
