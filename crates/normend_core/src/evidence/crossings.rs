@@ -63,7 +63,7 @@ pub fn crossing_axes(n_points: usize) -> usize {
 /// neighborhood is unanimous at.
 ///
 /// Directions are spread evenly in the frame of the cloud's principal axes, so results turn with the cloud. O(n · axes) time,
-/// in parallel; about 65 bytes a point and some megabytes a thread while it works.
+/// in parallel; about 80 bytes a point while it works.
 ///
 /// # Errors
 /// [`Cancelled`] when `progress` asks to stop; nothing else.

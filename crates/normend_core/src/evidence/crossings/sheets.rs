@@ -8,7 +8,7 @@ use super::super::scene::Scene;
 use super::{Tally, smoothstep};
 
 /// Steps between discs from which on they are of two sheets, in spacings of the sparser one. The tight one sees both sides of a
-/// body half a spacing thick, where its points are exact; the loose one takes noise of a spacing for one sheet.
+/// body just over half a spacing thick, where its points are exact; the loose one takes noise of a spacing for one sheet.
 pub(super) const TOLERANCES: [f32; 3] = [0.55, 1.1, 1.95];
 
 /// Thickness of a sheet up to which it is surely one, in tolerances; twice that is surely more. Within one sheet, discs of
