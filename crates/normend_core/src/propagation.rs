@@ -20,7 +20,7 @@ pub use self::preset::Preset;
 use self::sides::sides;
 pub use self::source_rule::{ETA, SourceRule, VIEWS};
 use crate::automatic;
-use crate::evidence::{Evidence, Known};
+use crate::evidence::{Evidence, Known, Origin};
 use crate::progress::Part;
 use crate::side_rule::{Clues, Side};
 use crate::{
@@ -333,8 +333,19 @@ impl Propagation {
         progress.stage("Looking for the right side");
         let mut clues = Clues::new(cloud, &found.normals, &splat_radii);
         clues.outside = Some(found.evidence.clone());
-        clues.gather(parameters.rule, known, &Part::new(progress, 0.95..1.0))?;
-        let decided = sides(&found.tree, parameters.rule, &clues);
+        clues.gather(parameters.rule, known, &Part::new(progress, 0.95..0.97))?;
+        let mut decided = sides(&found.tree, parameters.rule, &clues);
+        let is_open = decided.iter().any(|side| side.rule.is_none());
+        if is_open && !found.evidence.origins().contains(&Origin::OutsideViews) {
+            // What lines say nothing of may be seen all the same.
+            let mut clues = Clues::new(cloud, &found.normals, &splat_radii);
+            clues.gather(parameters.rule, known, &Part::new(progress, 0.97..1.0))?;
+            for (side, again) in decided.iter_mut().zip(sides(&found.tree, parameters.rule, &clues)) {
+                if side.rule.is_none() {
+                    *side = again;
+                }
+            }
+        }
         drop(clues);
         let mut initially_turned = FixedBitSet::with_capacity(cloud.n_points());
         for (&root, side) in found.tree.roots().iter().zip(&decided) {

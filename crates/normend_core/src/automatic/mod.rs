@@ -19,6 +19,9 @@ mod refinement;
 mod same_side;
 mod sheet_normals;
 
+#[cfg(test)]
+mod tests;
+
 use std::sync::atomic::AtomicI64;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -75,7 +78,8 @@ pub(crate) struct Unoriented {
     noisy: Vec<bool>,
 }
 
-/// Gathers what is known of the sides of `normals`.
+/// Gathers what is known of the sides of `normals`: sheets counted along lines, scanner places, and views from outside where
+/// the lines say little, as of open surfaces.
 ///
 /// # Errors
 /// [`Cancelled`] when `progress` asks to stop; nothing else.
@@ -89,24 +93,21 @@ pub(crate) fn gather_evidence(
 ) -> Result<Evidence, Cancelled> {
     let n_axes = evidence::crossing_axes(cloud.n_points());
     let mut evidence = evidence::crossings(cloud, neighbors, radii, normals, n_axes, &Part::new(progress, 0.0..0.5))?;
-    let part = Part::new(progress, 0.5..1.0);
-    evidence.add(&evidence::outside_views(
-        cloud,
-        radii,
-        normals,
-        n_views(cloud.n_points()),
-        &part,
-    )?);
+    if evidence.share_known() < MOSTLY_KNOWN {
+        let part = Part::new(progress, 0.5..1.0);
+        evidence.add(&evidence::outside_views(cloud, radii, normals, N_VIEWS, &part)?);
+    }
     if !known.stations.is_empty() {
         evidence.add(&evidence::scanner(cloud, normals, known.stations));
     }
     Ok(evidence)
 }
 
-/// Views from outside. Large clouds have many points for each part of the surface, whose votes add up, so fewer views do.
-fn n_views(n_points: usize) -> usize {
-    if n_points > 300_000 { 14 } else { 26 }
-}
+/// Share of points with a vote from which on views from outside add nothing: the nearest sheet on each line is what they see.
+const MOSTLY_KNOWN: f64 = 0.8;
+
+/// Views from outside where they are needed. With 64 and with 14 as many normals came out wrong.
+const N_VIEWS: usize = 26;
 
 /// Finds the signs of `unoriented` normals and the tree of the merges.
 ///
@@ -144,8 +145,8 @@ pub(crate) fn orient(
     };
     let second = solve(surface, &rows, K_ROW, &evidence, &Part::new(progress, 0.4..0.8))?;
     drop(rows);
-    let (tree, patches) = tree_of_merges(&second, &Part::new(progress, 0.8..1.0))?;
-    let Solution { turned, .. } = second;
+    let Solution { agglomeration, turned } = second;
+    let (tree, patches) = tree_of_merges(agglomeration, &turned, &Part::new(progress, 0.8..1.0))?;
 
     let mut normals = normals;
     let mut evidence = evidence;
@@ -192,90 +193,95 @@ fn solve(
     Ok(Solution { agglomeration, turned })
 }
 
-/// The spanning tree and the patches of a solution. O(edges · levels) at most, in parallel.
-fn tree_of_merges(solution: &Solution, progress: &dyn Progress) -> Result<(SpanningTree, Patches), Cancelled> {
-    let Solution { agglomeration, turned } = solution;
-    let levels = &agglomeration.levels;
-    let n_points = turned.len();
-    let Some(points) = levels.first() else {
-        let tree = SpanningTree::new(&RiemannianGraph::from_edges(n_points, &[]), progress)?;
-        let patches = Patches::new(&tree, &[]);
-        return Ok((tree, patches));
+/// The spanning tree and the patches of an agglomeration whose `turned` points turn. O(edges · levels) at most, in parallel.
+fn tree_of_merges(
+    agglomeration: Agglomeration,
+    turned: &FixedBitSet,
+    progress: &dyn Progress,
+) -> Result<(SpanningTree, Patches), Cancelled> {
+    let Agglomeration { levels, components } = agglomeration;
+    // Who became part of whom is all that is needed of the levels past the points.
+    let mut sizes: Vec<usize> = levels.iter().map(|level| level.graph.n_clusters()).collect();
+    sizes.push(components.n_clusters());
+    drop(components);
+    let mut points = None;
+    let mut parents: Vec<Vec<u32>> = Vec::with_capacity(sizes.len());
+    for level in levels {
+        points.get_or_insert(level.graph);
+        parents.push(level.parents);
+    }
+    // A satisfied and a whole sum by cluster and level: first of what became inner at the level, then of the boundary.
+    let sums = |n_clusters: &usize| {
+        (0..*n_clusters)
+            .map(|_| [AtomicI64::new(0), AtomicI64::new(0)])
+            .collect()
     };
-    // How well the boundary of each cluster is satisfied: what its parts have, without twice what became inner at its level.
-    let sums = |clusters: usize| -> Vec<[AtomicI64; 2]> {
-        (0..clusters).map(|_| [AtomicI64::new(0), AtomicI64::new(0)]).collect()
+    let boundaries: Vec<Vec<[AtomicI64; 2]>> = sizes.iter().map(sums).collect();
+    let join = |point: usize, other: u32, coupling: i32| {
+        let all = i64::from(coupling).abs();
+        let agrees = (coupling > 0) == (turned.contains(point) == turned.contains(other as usize));
+        let satisfied = if agrees { all } else { -all };
+        let own = &boundaries[0][point];
+        own[0].fetch_add(satisfied, Relaxed);
+        own[1].fetch_add(all, Relaxed);
+        if other < point as u32 {
+            return None;
+        }
+        let (mut a, mut b, mut level) = (point as u32, other, 0);
+        while a != b {
+            (a, b) = (parents[level][a as usize], parents[level][b as usize]);
+            level += 1;
+        }
+        let inner = &boundaries[level][a as usize];
+        inner[0].fetch_sub(2 * satisfied, Relaxed);
+        inner[1].fetch_sub(2 * all, Relaxed);
+        // Within a level the edges that are satisfied best make the tree.
+        let doubt = 0.5 - satisfied as f32 / (4 * COUPLING_UNIT) as f32;
+        Some((point as u32, other, level as f32 + doubt.clamp(0.0, 0.99), false))
     };
-    let n_clusters = |level: usize| {
-        levels
-            .get(level)
-            .map_or(agglomeration.components.n_clusters(), |l| l.graph.n_clusters())
+    let edges: Vec<(u32, u32, f32, bool)> = match &points {
+        None => Vec::new(),
+        Some(points) => {
+            let join = &join;
+            (0..turned.len())
+                .into_par_iter()
+                .with_min_len(4096)
+                .flat_map_iter(|point| {
+                    let row = points.row(point);
+                    row.filter_map(move |(other, coupling)| join(point, other, coupling))
+                })
+                .collect()
+        }
     };
-    let boundaries: Vec<Vec<[AtomicI64; 2]>> = (0..=levels.len()).map(|level| sums(n_clusters(level))).collect();
-    let edges: Vec<(u32, u32, f32, bool)> = (0..n_points)
-        .into_par_iter()
-        .with_min_len(4096)
-        .flat_map_iter(|point| {
-            let boundaries = &boundaries;
-            points.graph.row(point).filter_map(move |(other, coupling)| {
-                let coupling = i64::from(coupling);
-                let satisfied = if turned.contains(point) == turned.contains(other as usize) {
-                    coupling
-                } else {
-                    -coupling
-                };
-                let own = &boundaries[0][point];
-                own[0].fetch_add(satisfied, Relaxed);
-                own[1].fetch_add(coupling.abs(), Relaxed);
-                if other < point as u32 {
-                    return None;
-                }
-                let (mut a, mut b, mut level) = (point as u32, other, 0);
-                while a != b {
-                    a = levels[level].parents[a as usize];
-                    b = levels[level].parents[b as usize];
-                    level += 1;
-                }
-                let inner = &boundaries[level][a as usize];
-                inner[0].fetch_sub(2 * satisfied, Relaxed);
-                inner[1].fetch_sub(2 * coupling.abs(), Relaxed);
-                // Within a level the best satisfied edges make the tree.
-                let doubt = 0.5 - satisfied as f32 / (4 * COUPLING_UNIT) as f32;
-                Some((point as u32, other, level as f32 + doubt.clamp(0.0, 0.99), false))
-            })
-        })
-        .collect();
+    drop(points);
     progress.report(0.3)?;
-    let mut strengths: Vec<Vec<f32>> = Vec::with_capacity(levels.len() + 1);
-    for level in 0..=levels.len() {
-        if level > 0 {
-            for (cluster, &parent) in levels[level - 1].parents.iter().enumerate() {
-                for part in 0..2 {
-                    let sum = boundaries[level - 1][cluster][part].load(Relaxed);
-                    boundaries[level][parent as usize][part].fetch_add(sum, Relaxed);
-                }
+    // A boundary is that of the parts, without both sides of what became inner.
+    for (level, parents) in parents.iter().enumerate() {
+        for (cluster, &parent) in parents.iter().enumerate() {
+            for part in 0..2 {
+                let sum = boundaries[level][cluster][part].load(Relaxed);
+                boundaries[level + 1][parent as usize][part].fetch_add(sum, Relaxed);
             }
         }
-        let strength = |[satisfied, all]: &[AtomicI64; 2]| match all.load(Relaxed) {
-            0 => 1.0,
-            all => (satisfied.load(Relaxed) as f64 / all as f64) as f32,
-        };
-        strengths.push(boundaries[level].iter().map(strength).collect());
     }
+    let strength = |[satisfied, all]: &[AtomicI64; 2]| match all.load(Relaxed) {
+        0 => 1.0,
+        all => (satisfied.load(Relaxed) as f64 / all as f64) as f32,
+    };
+    let strengths: Vec<Vec<f32>> = (boundaries.iter())
+        .map(|sums| sums.iter().map(strength).collect())
+        .collect();
     drop(boundaries);
-    let graph = RiemannianGraph::from_edges(n_points, &edges);
+    let graph = RiemannianGraph::from_edges(turned.len(), &edges);
     drop(edges);
     let tree = SpanningTree::new(&graph, &Part::new(progress, 0.4..0.8))?;
     drop(graph);
-    let none = Vec::new();
-    let patch_levels: Vec<Level<'_>> = strengths
-        .iter()
-        .enumerate()
-        .map(|(level, strengths)| Level {
-            parents: levels.get(level).map_or(&none, |level| &level.parents),
-            strengths,
-        })
+    // The last level, the components, has no parents; when no points were joined, it is no level of its own.
+    parents.push(Vec::new());
+    let levels = parents.iter().zip(&strengths);
+    let levels: Vec<Level<'_>> = levels
+        .map(|(parents, strengths)| Level { parents, strengths })
         .collect();
-    let patches = Patches::new(&tree, &patch_levels);
+    let patches = Patches::new(&tree, if levels.len() > 1 { &levels } else { &[] });
     Ok((tree, patches))
 }
