@@ -1,6 +1,7 @@
 //! What can be typed: the one table of commands and flags, which gives the parser and the help.
 
 pub mod bench;
+pub mod suspects;
 
 use std::fmt;
 use std::path::PathBuf;
@@ -17,6 +18,7 @@ use normend_io::{ReadError, Scan};
 use normend_render::{DisplayMode, StandardView};
 
 use self::bench::BenchArguments;
+use self::suspects::SuspectsArguments;
 use crate::commands::render::{PaletteName, PictureSize};
 
 /// Most neighbors that can be asked for: each costs 4 bytes a point, and no surface is flat over a thousand points.
@@ -90,6 +92,8 @@ pub enum Command {
     Orient(OrientArguments),
     /// Count the normals that point to the wrong side
     Check(CheckArguments),
+    /// List the patches that probably point to the wrong side
+    Suspects(SuspectsArguments),
     /// Draw a scan into a PNG picture
     Render(RenderArguments),
     /// Write a generated scan whose normals are known
@@ -104,6 +108,7 @@ impl Command {
         match self {
             Self::Orient(_) => "orient",
             Self::Check(_) => "check",
+            Self::Suspects(_) => "suspects",
             Self::Render(_) => "render",
             Self::Generate(_) => "generate",
             Self::Bench(_) => "bench",

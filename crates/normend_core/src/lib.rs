@@ -39,6 +39,10 @@ mod automatic;
 
 pub mod propagation;
 
+pub mod confidence;
+
+pub mod suspects;
+
 pub mod document;
 
 pub mod metrics;

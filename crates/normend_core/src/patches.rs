@@ -140,7 +140,7 @@ impl Patches {
 
     /// All patches with the index of the one that each is part of, itself for a component. The points come first, in the order
     /// of their ids; every patch comes before the one it is part of.
-    pub fn all(&self) -> impl ExactSizeIterator<Item = (Patch, u32)> {
+    pub fn all(&self) -> impl DoubleEndedIterator<Item = (Patch, u32)> + ExactSizeIterator {
         (0..self.parents.len()).map(|node| (self.patch(node as u32), self.parents[node]))
     }
 

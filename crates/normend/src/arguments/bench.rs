@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use normend_core::suspects;
 
+use super::suspects::share;
 use super::{CommonArguments, PropagationArguments};
 
 /// `normend bench`.
@@ -23,6 +25,8 @@ pub enum BenchCommand {
     Quality(QualityArguments),
     /// Count the clicks of a simulated user until no wrong region is left
     Clicks(ClicksArguments),
+    /// Count the suspects that are wrong, and compare confidence with what is right
+    Suspects(SuspectsArguments),
     /// Make the figures of the paper as tables
     Paper(PaperArguments),
 }
@@ -133,6 +137,49 @@ pub struct ClicksArguments {
     pub only: Vec<String>,
 
     /// Rows for each cloud that had a wrong region too
+    #[arg(long)]
+    pub clouds: bool,
+
+    /// What every command takes.
+    #[command(flatten)]
+    pub common: CommonArguments,
+}
+
+/// `normend bench suspects`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Each DIR/<class>/<name>.raw.ply is oriented and searched for suspects, as `normend suspects` does, and both are compared with \
+DIR/<class>/<name>.ply. With another preset than auto, its result is what is searched. Wholes of the class open, and scans of \
+rooms (scan/room…), may be flipped, and are no suspects then.
+
+A row has the clouds without a wrong region (10 or more connected points) and on how many of them there is a suspect all the \
+same; the clouds with one and on how many of them there is a suspect; and on these how many are right, which is when most of \
+its points are wrong: of the first ones, the first three, and all.
+
+The table below has the points by the confidence of the automatic method: where a bin begins, how many points, their mean \
+confidence, and the share that is right.
+
+Examples:
+  normend bench suspects generated/
+  normend bench suspects generated/ --preset tree --clouds")]
+pub struct SuspectsArguments {
+    /// Folder of classes of clouds
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+
+    /// How signs are found.
+    #[command(flatten)]
+    pub propagation: PropagationArguments,
+
+    /// The score from which on a patch is a suspect
+    #[arg(long, value_name = "X", default_value_t = suspects::THRESHOLD, value_parser = share)]
+    pub threshold: f32,
+
+    /// Only the clouds of this name or class; can be given several times
+    #[arg(long, value_name = "NAME")]
+    pub only: Vec<String>,
+
+    /// A row for each cloud with a wrong region or a suspect too
     #[arg(long)]
     pub clouds: bool,
 

@@ -23,7 +23,7 @@ const PATIENCE: usize = 60;
 
 /// Whether the truth of a cloud is its inside or outside by convention only, which a user knows and says once for all: the
 /// whole of it may be flipped then before the first click.
-fn has_convention_only(case: &Case) -> bool {
+pub(super) fn has_convention_only(case: &Case) -> bool {
     case.class == OPEN || (case.class == SCAN && case.name.starts_with(ROOM))
 }
 

@@ -5,6 +5,7 @@ mod clouds;
 mod folder;
 mod paper;
 mod quality;
+mod suspects;
 
 use super::Outcome;
 use crate::arguments::bench::{BenchArguments, BenchCommand};
@@ -19,5 +20,6 @@ pub fn run(arguments: &BenchArguments) -> anyhow::Result<Outcome> {
         BenchCommand::Quality(arguments) => quality::run(arguments),
         BenchCommand::Paper(arguments) => paper::run(arguments),
         BenchCommand::Clicks(arguments) => clicks::run(arguments),
+        BenchCommand::Suspects(arguments) => suspects::run(arguments),
     }
 }
