@@ -1,5 +1,8 @@
 //! The signed graph of clusters: how strongly each two neighboring clusters belong together as they are, or with one turned.
 
+use std::sync::atomic::AtomicU32;
+use std::sync::atomic::Ordering::Relaxed;
+
 use fixedbitset::FixedBitSet;
 use rayon::prelude::*;
 
@@ -206,9 +209,6 @@ struct JoinedRows {
     couplings: Vec<i32>,
     pulls: Vec<Pull>,
 }
-
-use std::sync::atomic::AtomicU32;
-use std::sync::atomic::Ordering::Relaxed;
 
 fn counters(length: usize) -> Vec<AtomicU32> {
     (0..length).map(|_| AtomicU32::new(0)).collect()

@@ -17,14 +17,15 @@ use crate::evidence::{Evidence, UNIT};
 
 /// Bins of `c`: the width of one, 7° at right angles, is about what normals of neighbors differ by for no reason.
 const C_BINS: usize = 8;
-/// Bins of the signed square root of `ab`, which is about the cosine between edge and normals.
+/// Bins of the signed fourth root of `ab`: the step of an edge between two sheets that all but touch is small, and on clean
+/// surfaces no other edge has it.
 const AB_BINS: usize = 12;
 /// Bins of the length, two fifths of a radius each; the last holds all longer ones.
 const LENGTH_BINS: usize = 4;
 const BINS: usize = C_BINS * AB_BINS * LENGTH_BINS;
 
 /// The weight of what is known before anything is counted, in edges: the prior says that reflection is right, as sure as
-/// `r|r|` of `r = c − 2ab` is large. Twenty edges are the neighborhoods of a few points, which may all be wrong for one reason.
+/// `r|r|` is large. Twenty edges are the neighborhoods of a few points, which may all be wrong for one reason.
 const PRIOR_EDGES: f64 = 20.0;
 
 /// The logarithm of the odds that make a coupling of 1. With four, an edge of perfect reflection is right 98 times of 100 before
@@ -39,7 +40,7 @@ struct Features {
     bin: usize,
     /// Whether one normal was turned to make `c` positive.
     folded: bool,
-    /// `r = c − 2ab`, for the folded normals.
+    /// How far the folded normals look like mirror images of each other, −1..=3.
     reflection: f64,
 }
 
@@ -66,12 +67,19 @@ impl Surface<'_> {
         let bin = |value: f32, n_bins: usize| ((value * n_bins as f32) as usize).min(n_bins - 1);
         let lengths = length / (self.radii[a] + self.radii[b]).max(f32::MIN_POSITIVE) * 2.0;
         let c_bin = bin(c, C_BINS);
-        let ab_bin = bin(0.5 * (ab.signum() * ab.abs().sqrt() + 1.0), AB_BINS);
+        let ab_bin = bin(0.5 * (ab.signum() * ab.abs().sqrt().sqrt() + 1.0), AB_BINS);
         let length_bin = ((lengths * 2.5) as usize).min(LENGTH_BINS - 1);
+        // Along an arc, the mirror image. Across a step, where edge and normals enclose an acute angle on both sides, sheets are likely
+        // two long before the mirror says so: there the sign turns at 60° from the normals and not at 45°.
+        let reflection = if ab > 0.0 {
+            c * (1.0 - 2.0 * ab.sqrt())
+        } else {
+            c - 2.0 * ab
+        };
         Features {
             bin: (length_bin * AB_BINS + ab_bin) * C_BINS + c_bin,
             folded,
-            reflection: f64::from(c) - 2.0 * f64::from(ab),
+            reflection: f64::from(reflection),
         }
     }
 }

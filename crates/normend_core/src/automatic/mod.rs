@@ -93,7 +93,7 @@ pub(crate) fn gather_evidence(
 ) -> Result<Evidence, Cancelled> {
     let n_axes = evidence::crossing_axes(cloud.n_points());
     let mut evidence = evidence::crossings(cloud, neighbors, radii, normals, n_axes, &Part::new(progress, 0.0..0.5))?;
-    if evidence.share_known() < MOSTLY_KNOWN {
+    if cloud.n_points() <= FEW_POINTS || evidence.share_known() < MOSTLY_KNOWN {
         let part = Part::new(progress, 0.5..1.0);
         evidence.add(&evidence::outside_views(cloud, radii, normals, N_VIEWS, &part)?);
     }
@@ -103,7 +103,10 @@ pub(crate) fn gather_evidence(
     Ok(evidence)
 }
 
-/// Share of points with a vote from which on views from outside add nothing: the nearest sheet on each line is what they see.
+/// Points up to which views from outside take no time to speak of; they mend single points of sparse clouds.
+const FEW_POINTS: usize = 200_000;
+
+/// Share of points with a vote from which on views from outside add nothing to dense clouds: the nearest sheet on each line is what they see.
 const MOSTLY_KNOWN: f64 = 0.8;
 
 /// Views from outside where they are needed. With 64 and with 14 as many normals came out wrong.
@@ -258,9 +261,9 @@ fn tree_of_merges(
     // A boundary is that of the parts, without both sides of what became inner.
     for (level, parents) in parents.iter().enumerate() {
         for (cluster, &parent) in parents.iter().enumerate() {
-            for part in 0..2 {
-                let sum = boundaries[level][cluster][part].load(Relaxed);
-                boundaries[level + 1][parent as usize][part].fetch_add(sum, Relaxed);
+            let sums = boundaries[level][cluster].iter().map(|sum| sum.load(Relaxed));
+            for (sum, part) in boundaries[level + 1][parent as usize].iter().zip(sums) {
+                sum.fetch_add(part, Relaxed);
             }
         }
     }

@@ -18,10 +18,11 @@ const SWEEPS: usize = 10;
 /// # Errors
 /// [`Cancelled`] when `progress` asks to stop; nothing else.
 pub(super) fn refined_signs(agglomeration: &Agglomeration, progress: &dyn Progress) -> Result<FixedBitSet, Cancelled> {
-    let mut turned: FixedBitSet = (agglomeration.components.pulls().iter().enumerate())
-        .filter(|(_, pull)| pull.signed < 0)
-        .map(|(component, _)| component)
-        .collect();
+    let components = &agglomeration.components;
+    let mut turned = FixedBitSet::with_capacity(components.n_clusters());
+    for (component, pull) in components.pulls().iter().enumerate() {
+        turned.set(component, pull.signed < 0);
+    }
     let n_levels = agglomeration.levels.len();
     for (index, level) in agglomeration.levels.iter().enumerate().rev() {
         progress.report(1.0 - index as f32 / n_levels as f32)?;
