@@ -1,13 +1,26 @@
-//! The bundled sample is what its generator makes, and its default start leaves a patch to mend.
+//! The bundled sample is what its generator makes: a part whose normals, as given, leave a patch to mend.
 
 use std::path::Path;
 use std::sync::Arc;
 
-use normend_core::{Document, Edit, Neighbors, Parameters, Propagation, Silent, metrics, shapes};
-use normend_io::{FileFormat, Positions, read, write_points};
+use normend_core::{Document, Edit, Neighbors, Parameters, Preset, Propagation, Silent, Start, metrics, shapes};
+use normend_io::{FileFormat, Positions, Scan, read, write_points};
 
 fn sample() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/sample.ply"))
+}
+
+/// The sample as the editor starts: with the normals of its file kept.
+fn opened(scan: &Scan) -> Document {
+    let parameters = Parameters {
+        start: Start::Keep,
+        ..Parameters::default()
+    };
+    let given = scan.given_normals.as_ref().unwrap();
+    let propagation = Propagation::new(&scan.cloud, given.as_slice(), parameters, &Silent).unwrap();
+    let mut document = Document::new(Arc::clone(&scan.cloud), scan.given_normals.clone());
+    document.install(propagation);
+    document
 }
 
 #[test]
@@ -15,7 +28,6 @@ fn the_sample_is_what_the_generator_makes() {
     let part = shapes::sample_part();
     let scan = read(sample(), &Silent).unwrap();
     assert_eq!((scan.format, scan.n_left_out), (FileFormat::Ply, 0));
-    assert!(scan.given_normals.is_none());
     assert_eq!(scan.cloud.n_points(), part.positions.len());
     // Sines may differ in the last bit from one system to the next.
     let most = 1e-6 * scan.cloud.diagonal();
@@ -26,13 +38,27 @@ fn the_sample_is_what_the_generator_makes() {
             "run the example make_sample again"
         );
     }
+    // The normals are those of the spanning tree on the points of the file.
+    let given = scan.given_normals.as_ref().unwrap();
+    let tree = Propagation::new(&scan.cloud, None, Preset::Tree.parameters(), &Silent).unwrap();
+    let oriented = tree.initial_normals();
+    let n_other = given
+        .iter()
+        .zip(&oriented)
+        .filter(|(a, b)| a.distance(**b) > 1e-3)
+        .count();
+    assert!(
+        n_other * 1000 <= given.len(),
+        "{n_other}: run the example make_sample again"
+    );
 
     let folder = tempfile::tempdir().unwrap();
     let again = folder.path().join("sample.ply");
-    write_points(&again, Positions::Float(&part.positions), None, &Silent).unwrap();
+    write_points(&again, Positions::Float(&part.positions), Some(&oriented), &Silent).unwrap();
     let (bundled, again) = (std::fs::read(sample()).unwrap(), std::fs::read(again).unwrap());
     assert_eq!(bundled.len(), again.len());
-    assert!(bundled.len() < 1_400_000);
+    // It is in the repository and in the program.
+    assert!(bundled.len() < 1_500_000);
 }
 
 /// The connected wrong patches (over the 8 nearest), largest first.
@@ -63,13 +89,16 @@ fn wrong_patches(neighbors: &Neighbors, wrong: &dyn Fn(usize) -> bool, n_points:
 }
 
 #[test]
-fn the_default_start_leaves_one_patch_that_a_click_mends() {
+fn the_given_normals_leave_one_patch_that_a_click_mends() {
     let truth = shapes::sample_part().normals;
-    let cloud = read(sample(), &Silent).unwrap().cloud;
+    let scan = read(sample(), &Silent).unwrap();
+    let cloud = Arc::clone(&scan.cloud);
     let n_points = cloud.n_points();
-    let mut document = Document::new(Arc::clone(&cloud), None);
-    let propagation = Propagation::new(&cloud, None, Parameters::default(), &Silent).unwrap();
-    document.install(propagation);
+    let mut document = opened(&scan);
+    assert_eq!(
+        &document.oriented_normals().unwrap(),
+        scan.given_normals.as_deref().unwrap()
+    );
 
     let compare = |document: &Document| {
         let normals = document.oriented_normals().unwrap();
@@ -99,4 +128,11 @@ fn the_default_start_leaves_one_patch_that_a_click_mends() {
     let after = compare(&document);
     // What is left lies on the sharp rims.
     assert!(after.n_wrong < n_points / 200, "{}", after.n_wrong);
+
+    // The automatic method needs no click.
+    document.install(Propagation::new(&cloud, None, Preset::Auto.parameters(), &Silent).unwrap());
+    document.undo().unwrap();
+    assert!(document.sources().is_empty());
+    let automatic = compare(&document);
+    assert!(automatic.n_wrong < n_points / 1000, "{}", automatic.n_wrong);
 }

@@ -12,6 +12,7 @@ use crate::job::JobError;
 use crate::panels::export::ExportWindow;
 use crate::panels::modal::Modal;
 use crate::panels::open_path::OpenPathWindow;
+use crate::panels::status_bar;
 use crate::scene_sync::Scene;
 use crate::session::Session;
 use crate::settings::SPLAT_SCALES;
@@ -482,6 +483,13 @@ impl App {
                 ),
                 (Start::Estimate, _) => format!("Oriented {n_points} in {time:.1} s."),
             });
+        let n_undecided = session.n_undecided();
+        if n_undecided > 0 {
+            self.messages.note(format!(
+                "{}: Ctrl-click turns one.",
+                status_bar::either_way(n_undecided)
+            ));
+        }
     }
 }
 

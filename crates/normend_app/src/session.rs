@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use normend_core::{Change, Document, Edit, EditError, Parameters, Propagation, Start};
+use normend_core::{Change, Document, Edit, EditError, Parameters, Propagation, SpanningTree, Start};
 use normend_io::Scan;
 
 /// An open scan.
@@ -25,6 +25,8 @@ pub struct Session {
     pub reveal: Option<u32>,
     /// Points without a normal in the file, which is fitted also where given normals are kept.
     pub n_without_normal: usize,
+    /// Components whose right side nothing tells but a source of the user, ascending, as indices of the tree's roots.
+    undecided: Vec<usize>,
     saved_revision: u64,
     /// As exported last, or of the first propagation; `None` before that.
     saved_parameters: Option<Parameters>,
@@ -50,6 +52,7 @@ impl Session {
         Self {
             reveal: None,
             n_without_normal,
+            undecided: Vec::new(),
             saved_revision: document.revision(),
             saved_parameters: None,
             scan: Arc::new(scan),
@@ -84,9 +87,30 @@ impl Session {
 
     /// Makes a propagation the one in force. The first is what the file is without the user, so it is nothing to lose.
     pub fn install(&mut self, propagation: Propagation) {
+        let voted: BTreeSet<usize> = (propagation.voted_sources.iter())
+            .map(|source| component(&propagation.tree, source.point))
+            .collect();
+        self.undecided = (propagation.sides.iter().enumerate())
+            .filter(|(component, side)| side.rule.is_none() && !voted.contains(component))
+            .map(|(component, _)| component)
+            .collect();
         self.document.install(propagation);
         self.requested = self.document.parameters();
         self.saved_parameters.get_or_insert(self.requested);
+    }
+
+    /// How many components could face either way: nothing tells their right side, and the user has not said it.
+    pub fn n_undecided(&self) -> usize {
+        let Some(propagation) = self.document.propagation().filter(|_| !self.undecided.is_empty()) else {
+            return 0;
+        };
+        let said: BTreeSet<usize> = (self.document.sources().iter())
+            .map(|source| component(&propagation.tree, source.point))
+            .collect();
+        self.undecided
+            .iter()
+            .filter(|component| !said.contains(component))
+            .count()
     }
 
     /// Applies an edit and keeps the selection to points that are sources.
@@ -157,6 +181,13 @@ impl Session {
             .unwrap_or_default();
         folder.join(format!("{stem}_oriented.{extension}"))
     }
+}
+
+/// The component that `point` belongs to, as an index of the tree's roots. O(log components).
+fn component(tree: &SpanningTree, point: u32) -> usize {
+    let position = tree.position(point);
+    // The first root is at position 0, so at least one counts.
+    tree.roots().partition_point(|&root| root <= position) - 1
 }
 
 /// The user's folder for documents, else the home folder.

@@ -12,7 +12,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use fixedbitset::FixedBitSet;
 use glam::{DVec3, Vec3};
 use normend_core::sources::Origin;
-use normend_core::{Document, Edit, Estimator, Parameters, PointCloud, Propagation, Regions, Silent, Source};
+use normend_core::{Document, Edit, Estimator, Parameters, PointCloud, Preset, Propagation, Regions, Silent, Source};
 
 /// Random numbers: SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators").
 struct Random(u64);
@@ -57,7 +57,7 @@ fn scan(n_points: usize, n_points_per_cut: Option<usize>) -> Document {
     };
     let parameters = Parameters {
         estimator: Estimator::Pca,
-        ..Parameters::default()
+        ..Preset::Tree.parameters()
     };
     let Ok(mut propagation) = Propagation::new(&cloud, None, parameters, &Silent) else {
         unreachable!("silent progress never cancels")

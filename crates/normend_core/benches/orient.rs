@@ -6,8 +6,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
 use normend_core::shapes::{self, Shape};
 use normend_core::{
-    Cancelled, EdgeRule, Estimator, Neighbors, Parameters, PointCloud, Propagation, RiemannianGraph, Silent,
-    SpanningTree, metrics, normals,
+    Cancelled, EdgeRule, Estimator, Neighbors, PointCloud, Preset, Propagation, RiemannianGraph, Silent, SpanningTree,
+    metrics, normals,
 };
 
 const N_POINTS: usize = 100_000;
@@ -29,7 +29,7 @@ fn finished<T>(result: Result<T, Cancelled>) -> T {
 fn stages(criterion: &mut Criterion) {
     let shape = shapes::mechanical_part(N_POINTS).with_noise(0.0006, 1);
     let cloud = cloud(&shape);
-    let parameters = Parameters::default();
+    let parameters = Preset::Tree.parameters();
     let (k, k_graph) = (parameters.k_normals, parameters.k_graph);
     let neighbors = finished(Neighbors::find(&cloud, k, &Silent));
     let normals = finished(normals::estimate(&cloud, &neighbors, k, Estimator::Obne, &Silent));
@@ -60,9 +60,11 @@ fn stages(criterion: &mut Criterion) {
     group.bench_function("tree", |bencher| {
         bencher.iter(|| SpanningTree::new(black_box(&graph), &Silent))
     });
-    group.bench_function("propagation", |bencher| {
-        bencher.iter(|| Propagation::new(black_box(&cloud), None, parameters, &Silent));
-    });
+    for preset in [Preset::Tree, Preset::Auto] {
+        group.bench_function(format!("propagation_{}", preset.name()), |bencher| {
+            bencher.iter(|| Propagation::new(black_box(&cloud), None, preset.parameters(), &Silent));
+        });
+    }
     group.bench_function("compare", |bencher| {
         bencher.iter(|| metrics::compare(black_box(&cloud), &shape.normals, &normals, &Silent));
     });

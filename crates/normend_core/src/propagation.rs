@@ -175,8 +175,8 @@ pub struct Propagation {
     /// The base regions, without a source: with [`Start::Estimate`] the components, each so that its default source points
     /// up; with [`Start::Keep`] cut wherever the given signs of an edge's ends disagree with the edge rule.
     pub base_regions: Regions,
-    /// The point of each component's default source, in the order of the tree's roots: the one farthest along +z. Empty
-    /// where signs start as given: there each region has the signs that came with it.
+    /// The point of each component's default source, in the order of the tree's roots: the one farthest along +z; where signs start
+    /// as given, of those in the component's largest base region.
     pub default_sources: Vec<u32>,
     /// The sources that the source rule found, ascending by point; the base regions have them already. A source of the document at
     /// the same point holds instead of one of these.
@@ -275,7 +275,7 @@ impl Propagation {
         let mut initial_cuts = FixedBitSet::with_capacity(tree.n_points());
         if let Some(given) = &given {
             given.cut_disagreements(&tree, &mut initial_cuts, &mut initially_turned);
-            default_sources.clear();
+            default_sources = given::default_sources(cloud, &tree, &initial_cuts);
         }
         let tree = Arc::new(tree);
         let mut base_regions = Regions::new(Arc::clone(&tree), initial_cuts, initially_turned);

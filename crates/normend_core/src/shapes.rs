@@ -187,9 +187,9 @@ pub fn mechanical_part(n_points: usize) -> Shape {
     solid.sample(n_points)
 }
 
-/// The bundled sample: [`mechanical_part`] with 80 000 points and a little noise.
+/// The bundled sample: [`mechanical_part`] with 60 000 points and a little noise.
 pub fn sample_part() -> Shape {
-    mechanical_part(80_000).with_noise(0.0006, 1)
+    mechanical_part(60_000).with_noise(0.0006, 1)
 }
 
 /// The `index`-th point of the R2 sequence in the unit square, shifted by `offset`: even, and never on a lattice.

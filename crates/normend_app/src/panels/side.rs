@@ -2,7 +2,7 @@
 
 use egui::{Button, Color32, ComboBox, DragValue, RichText, Slider, Stroke, StrokeKind, Ui, Vec2};
 use normend_core::propagation::{ETA, VIEWS};
-use normend_core::{EdgeRule, Estimator, Parameters, Preset, SourceRule, Start};
+use normend_core::{EdgeRule, Estimator, Method, Parameters, Preset, SideRule, SourceRule, Start};
 use normend_render::{DisplayMode, Palette};
 
 use super::sources;
@@ -14,7 +14,6 @@ use crate::theme::{self, SPACE_S, SPACE_XS};
 const K_NORMALS: std::ops::RangeInclusive<usize> = 3..=64;
 /// Width of the button to keep given normals, in points; the other one takes the rest of the column.
 const KEEP_WIDTH: f32 = 94.0;
-const NOTHING_IS_FITTED: &str = "Nothing is fitted: every normal of the file is kept";
 const K_GRAPH: std::ops::RangeInclusive<usize> = 1..=32;
 
 /// The side panel. `propagating` says that a propagation runs, `blocked` why none can be started.
@@ -89,49 +88,24 @@ impl std::fmt::Display for Short {
 fn propagation(ui: &mut Ui, session: &mut Session, propagating: bool, blocked: Option<&str>) -> Option<Action> {
     let has_normals = session.scan.given_normals.is_some();
     let draft = &mut session.draft;
-    let fits = draft.start != Start::Keep || session.n_without_normal > 0;
+    // Only what has an effect is shown: the automatic method chooses for itself, and given normals say their side.
     theme::rows(ui, "propagation", |ui| {
         start_row(ui, draft, has_normals);
-        preset_row(ui, draft);
-        theme::input_row(ui, "Estimator", "How a normal is fitted to its neighbors", |ui| {
-            let combo = ComboBox::from_id_salt("estimator").selected_text(draft.estimator.label());
-            let before = draft.estimator;
-            let show = |ui: &mut Ui| {
-                combo
-                    .show_ui(ui, |ui| {
-                        for each in Estimator::ALL {
-                            ui.selectable_value(&mut draft.estimator, each, each.label());
-                        }
-                    })
-                    .response
-            };
-            let response = ui.add_enabled_ui(fits, show).inner;
-            if draft.k_normals == before.usual_k() {
-                draft.k_normals = draft.estimator.usual_k();
-            }
-            response.on_disabled_hover_text(NOTHING_IS_FITTED)
-        });
-        theme::input_row(ui, "k for normals", "Neighbors that a normal is fitted to", |ui| {
-            let k = DragValue::new(&mut draft.k_normals).range(K_NORMALS).speed(0.1);
-            ui.add_enabled(fits, k).on_disabled_hover_text(NOTHING_IS_FITTED)
-        });
-        theme::input_row(
-            ui,
-            "k for the graph",
-            "Neighbors of each point in the Riemannian graph",
-            |ui| ui.add(DragValue::new(&mut draft.k_graph).range(K_GRAPH).speed(0.1)),
-        );
-        theme::input_row(ui, "Edge rule", "How the normals of neighbors are compared", |ui| {
-            ComboBox::from_id_salt("edge rule")
-                .selected_text(draft.edge_rule.label())
-                .show_ui(ui, |ui| {
-                    for each in EdgeRule::ALL {
-                        ui.selectable_value(&mut draft.edge_rule, each, each.label());
-                    }
-                })
-                .response
-        });
-        source_rows(ui, draft);
+        let keeps = draft.start == Start::Keep;
+        if !keeps {
+            preset_row(ui, draft);
+            side_row(ui, draft, has_normals);
+        }
+        if !keeps && draft.method == Method::Agglomeration {
+            return;
+        }
+        if !keeps || session.n_without_normal > 0 {
+            estimator_rows(ui, draft);
+        }
+        graph_rows(ui, draft);
+        if !keeps {
+            source_rows(ui, draft);
+        }
     });
     let never_ran = session.document.propagation().is_none() && !propagating;
     let changed = *draft != session.requested;
@@ -207,6 +181,7 @@ fn preset_row(ui: &mut Ui, draft: &mut Parameters) {
                         if ui.selectable_label(present == Some(each), each.label()).clicked() {
                             *draft = Parameters {
                                 start: draft.start,
+                                rule: draft.rule,
                                 ..each.parameters()
                             };
                         }
@@ -217,29 +192,104 @@ fn preset_row(ui: &mut Ui, draft: &mut Parameters) {
     );
 }
 
+/// The rule for the side of each component.
+fn side_row(ui: &mut Ui, draft: &mut Parameters, has_normals: bool) {
+    theme::input_row(ui, "Right side", "Where the normals of each part point", |ui| {
+        ComboBox::from_id_salt("right side")
+            .selected_text(draft.rule.label())
+            .show_ui(ui, |ui| {
+                for each in SideRule::ALL {
+                    let missing = match each {
+                        SideRule::TowardScanner => Some(
+                            "No place of the scanner is known here; normend orient takes it with --scanner or --sensors",
+                        ),
+                        SideRule::Given if !has_normals => Some("This file has no normals"),
+                        _ => None,
+                    };
+                    let button = Button::selectable(draft.rule == each, each.label());
+                    let response = ui
+                        .add_enabled(missing.is_none(), button)
+                        .on_hover_text(side_meaning(each))
+                        .on_disabled_hover_text(missing.unwrap_or_default());
+                    if response.clicked() {
+                        draft.rule = each;
+                    }
+                }
+            })
+            .response
+    });
+}
+
+fn side_meaning(rule: SideRule) -> &'static str {
+    match rule {
+        SideRule::Outward => "Out of the thing: objects",
+        SideRule::TowardScanner => "Toward the place that a point was scanned from",
+        SideRule::Up => "Up along z: terrain",
+        SideRule::IntoRoom => "To where one stands inside: rooms",
+        SideRule::Given => "As most normals of the file do",
+    }
+}
+
+/// How normals are fitted.
+fn estimator_rows(ui: &mut Ui, draft: &mut Parameters) {
+    theme::input_row(ui, "Estimator", "How a normal is fitted to its neighbors", |ui| {
+        let before = draft.estimator;
+        let response = ComboBox::from_id_salt("estimator")
+            .selected_text(draft.estimator.label())
+            .show_ui(ui, |ui| {
+                for each in Estimator::ALL {
+                    ui.selectable_value(&mut draft.estimator, each, each.label());
+                }
+            })
+            .response;
+        if draft.k_normals == before.usual_k() {
+            draft.k_normals = draft.estimator.usual_k();
+        }
+        response
+    });
+    theme::input_row(ui, "k for normals", "Neighbors that a normal is fitted to", |ui| {
+        ui.add(DragValue::new(&mut draft.k_normals).range(K_NORMALS).speed(0.1))
+    });
+}
+
+/// What the spanning tree is grown on, which is what clicks go by.
+fn graph_rows(ui: &mut Ui, draft: &mut Parameters) {
+    theme::input_row(
+        ui,
+        "k for the graph",
+        "Neighbors of each point in the Riemannian graph",
+        |ui| ui.add(DragValue::new(&mut draft.k_graph).range(K_GRAPH).speed(0.1)),
+    );
+    theme::input_row(ui, "Edge rule", "How the normals of neighbors are compared", |ui| {
+        ComboBox::from_id_salt("edge rule")
+            .selected_text(draft.edge_rule.label())
+            .show_ui(ui, |ui| {
+                for each in EdgeRule::ALL {
+                    ui.selectable_value(&mut draft.edge_rule, each, each.label());
+                }
+            })
+            .response
+    });
+}
+
 /// Who vouches for the first signs, and how many look.
 fn source_rows(ui: &mut Ui, draft: &mut Parameters) {
-    let votes = draft.start == Start::Estimate;
     theme::input_row(
         ui,
         "First sources",
         "Who says which side is right, before you do",
         |ui| {
-            let combo = ComboBox::from_id_salt("sources").selected_text(draft.sources.label());
-            let show = |ui: &mut Ui| {
-                combo
-                    .show_ui(ui, |ui| {
-                        for each in SourceRule::ALL {
-                            ui.selectable_value(&mut draft.sources, each, each.label());
-                        }
-                    })
-                    .response
-            };
-            let response = ui.add_enabled_ui(votes, show).inner;
-            response.on_disabled_hover_text("The normals of the file say it")
+            ComboBox::from_id_salt("sources")
+                .selected_text(draft.sources.label())
+                .show_ui(ui, |ui| {
+                    for each in SourceRule::ALL {
+                        ui.selectable_value(&mut draft.sources, each, each.label());
+                    }
+                })
+                .response
         },
     );
-    if votes && draft.sources != SourceRule::Highest {
+    if draft.sources != SourceRule::Highest {
         theme::input_row(ui, "Viewpoints", "8 are the corners of the bounding box", |ui| {
             ui.add(DragValue::new(&mut draft.views).range(VIEWS).speed(0.1))
         });

@@ -23,6 +23,12 @@ pub fn ui(
                     }
                     ui.label(fact);
                 }
+                let n_undecided = session.n_undecided();
+                if n_undecided > 0 {
+                    ui.label(RichText::new("·").weak());
+                    ui.label(RichText::new(either_way(n_undecided)).color(ui.visuals().warn_fg_color))
+                        .on_hover_text(EITHER_WAY);
+                }
             }
             None => {
                 ui.label(RichText::new("No scan is open").weak());
@@ -41,6 +47,18 @@ pub fn ui(
             }
         });
     });
+}
+
+/// What to do about components that could face either way.
+const EITHER_WAY: &str = "Nothing tells which side of them is the right one: they are seen from both sides, or from none.\n\
+                          Ctrl-click turns a whole component; another rule for the right side may tell more.";
+
+/// Says in words that so many components could face either way.
+pub fn either_way(n_undecided: usize) -> String {
+    format!(
+        "{} could face either way",
+        theme::counted(n_undecided as u64, "component", "components")
+    )
 }
 
 fn facts(session: &Session) -> Vec<String> {

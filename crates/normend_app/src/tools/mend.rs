@@ -474,6 +474,9 @@ mod tests {
         tool.choose(&document, Some(1));
         assert_eq!(n_aimed(&tool, &document, 1), Some(1), "point 0 is vouched for");
         assert_eq!(tool.aim(&document, 0, Means::Patch).edit, Edit::Mend(0));
-        assert_eq!(n_aimed(&tool, &document, 2), Some(2));
+        let beside = tool.aim(&document, 2, Means::Patch);
+        assert_eq!(beside.patch.as_ref().map(|aimed| aimed.patch.n_points), Some(4));
+        let n_turned = beside.preview(&document).unwrap().n_points();
+        assert_eq!(n_turned, 2, "the patch that point 0 vouches for stays");
     }
 }

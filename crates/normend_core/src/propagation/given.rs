@@ -4,7 +4,7 @@ use fixedbitset::FixedBitSet;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::SpanningTree;
+use crate::{PointCloud, SpanningTree};
 
 /// The file's normals, made unit, and the points without one.
 pub(super) struct GivenNormals {
@@ -95,6 +95,43 @@ impl GivenNormals {
             }
         }
     }
+}
+
+/// The default source of each component of `tree` that is cut at `cuts`, in the order of its roots: of the largest region, which is
+/// right if most is, the point farthest along +z; of several regions or points the first in the tree. O(n).
+pub(super) fn default_sources(cloud: &PointCloud, tree: &SpanningTree, cuts: &FixedBitSet) -> Vec<u32> {
+    let mut tops: Vec<u32> = (0..tree.n_points() as u32).collect();
+    let mut sizes = vec![0_u32; tree.n_points()];
+    for position in 0..tree.n_points() {
+        // Parents come before their children.
+        if let Some(parent) = tree.parent(position as u32).filter(|_| !cuts.contains(position)) {
+            tops[position] = tops[parent as usize];
+        }
+        sizes[tops[position] as usize] += 1;
+    }
+    let point = |position: u32| tree.order()[position as usize];
+    let height = |position: u32| cloud.positions()[point(position) as usize].z;
+    (tree.roots().par_iter())
+        .map(|&root| {
+            let largest = (tree.subtree(root)).fold(root, |largest, top| {
+                if sizes[top as usize] > sizes[largest as usize] {
+                    top
+                } else {
+                    largest
+                }
+            });
+            let highest = (tree.subtree(root))
+                .filter(|&position| tops[position as usize] == largest)
+                .fold(largest, |highest, position| {
+                    if height(position) > height(highest) {
+                        position
+                    } else {
+                        highest
+                    }
+                });
+            point(highest)
+        })
+        .collect()
 }
 
 /// Union-find over positions and the ground; each node knows whether its sign differs from that of the node above.

@@ -54,8 +54,12 @@ impl Preset {
         }
     }
 
-    /// The preset that stands for `parameters`, whatever they start from and whichever side is right; `None` when something was set by hand.
+    /// The preset that stands for `parameters`, whatever they start from and whichever side is right; `None` when something was set
+    /// by hand. What is without effect under [`Method::Agglomeration`] does not count.
     pub fn of(parameters: &Parameters) -> Option<Self> {
+        if parameters.method == Method::Agglomeration {
+            return Some(Self::Auto);
+        }
         Self::ALL.into_iter().find(|preset| {
             let own = Parameters {
                 start: parameters.start,
@@ -80,7 +84,7 @@ mod tests {
             parameters.start = Start::Keep;
             assert_eq!(Preset::of(&parameters), Some(preset));
             parameters.k_graph += 1;
-            assert_eq!(Preset::of(&parameters), None);
+            assert_eq!(Preset::of(&parameters), (preset == Preset::Auto).then_some(preset));
         }
         assert_eq!(Preset::default().parameters(), Parameters::default());
     }

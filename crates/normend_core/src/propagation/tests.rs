@@ -27,14 +27,32 @@ fn propagate(cloud: &PointCloud, given: Option<&[Vec3]>, start: Start) -> Propag
     Propagation::new(cloud, given, parameters, &Silent).unwrap()
 }
 
+fn of_preset(cloud: &PointCloud, preset: Preset) -> Propagation {
+    Propagation::new(cloud, None, preset.parameters(), &Silent).unwrap()
+}
+
 #[test]
 fn each_component_starts_upward() {
-    let propagation = propagate(&sheets(12, 2), None, Start::Estimate);
-    assert_eq!(propagation.tree.roots().len(), 2);
-    assert_eq!(propagation.base_regions.n_base_regions(), 2);
-    assert!(propagation.initial_normals().iter().all(|normal| normal.z > 0.999));
-    let stages: Vec<Stage> = propagation.seconds.iter().map(|(stage, _)| *stage).collect();
-    assert_eq!(stages, [Stage::Neighbors, Stage::Normals, Stage::Graph, Stage::Tree]);
+    let cloud = sheets(12, 2);
+    let tree: &[Stage] = &[Stage::Neighbors, Stage::Normals, Stage::Graph, Stage::Tree];
+    let auto: &[Stage] = &[
+        Stage::Neighbors,
+        Stage::Normals,
+        Stage::Evidence,
+        Stage::Agglomeration,
+        Stage::Tree,
+    ];
+    for (preset, expect) in [(Preset::Tree, tree), (Preset::Auto, auto)] {
+        let propagation = of_preset(&cloud, preset);
+        assert_eq!(propagation.tree.roots().len(), 2);
+        assert_eq!(propagation.base_regions.n_base_regions(), 2);
+        let n_up = (propagation.initial_normals().iter())
+            .filter(|normal| normal.z > 0.999)
+            .count();
+        assert_eq!(n_up, cloud.n_points(), "{}", preset.name());
+        let stages: Vec<Stage> = propagation.seconds.iter().map(|(stage, _)| *stage).collect();
+        assert_eq!(stages, expect);
+    }
 }
 
 #[test]
@@ -124,6 +142,35 @@ fn keep_without_given_normals_estimates() {
 }
 
 #[test]
+fn the_largest_given_region_has_the_default_source() {
+    let shape = shapes::sphere(2000);
+    let cloud = PointCloud::new(DVec3::ZERO, shape.positions).unwrap();
+    let is_wrong = |normal: Vec3| normal.z > 0.6;
+    let given: Vec<Vec3> = (shape.normals.iter())
+        .map(|&normal| if is_wrong(normal) { -normal } else { normal })
+        .collect();
+    let propagation = propagate(&cloud, Some(&given), Start::Keep);
+    let [default] = propagation.default_sources[..] else {
+        panic!("one component has one default source")
+    };
+    assert!(!is_wrong(shape.normals[default as usize]));
+
+    // A click on the wrong cap turns a region of it whole, one elsewhere no more than a part of the right region.
+    let mut document = crate::Document::new(Arc::new(cloud), Some(Arc::new(given)));
+    document.install(propagation);
+    let base_regions = &document.propagation().unwrap().base_regions;
+    for point in (0..2000).filter(|&point| point != default) {
+        let n_turned = document.preview_mend(point).unwrap().n_points();
+        let n_region = base_regions.region_of(point).n_points();
+        if base_regions.in_one_region(point, default) {
+            assert!(n_turned < n_region, "{point}: {n_turned}");
+        } else {
+            assert_eq!(n_turned, n_region);
+        }
+    }
+}
+
+#[test]
 fn very_small_clouds() {
     for n_points in 0..6 {
         for spread in [0.0, 1.0] {
@@ -131,16 +178,18 @@ fn very_small_clouds() {
                 .map(|i| Vec3::new(i as f32, (i * i) as f32, 0.0) * spread)
                 .collect();
             let cloud = PointCloud::new(DVec3::ZERO, positions).unwrap();
-            let propagation = propagate(&cloud, None, Start::Estimate);
-            assert_eq!(propagation.normals.len(), n_points);
-            assert!(propagation.normals.iter().all(|normal| normal.is_normalized()));
-            assert!(
-                propagation
-                    .splat_radii
-                    .iter()
-                    .all(|&radius| radius > 0.0 && radius.is_finite())
-            );
-            assert_eq!(propagation.tree.roots().len(), n_points.min(1));
+            for preset in [Preset::Auto, Preset::Tree] {
+                let propagation = of_preset(&cloud, preset);
+                assert_eq!(propagation.normals.len(), n_points);
+                assert!(propagation.normals.iter().all(|normal| normal.is_normalized()));
+                assert!(
+                    propagation
+                        .splat_radii
+                        .iter()
+                        .all(|&radius| radius > 0.0 && radius.is_finite())
+                );
+                assert_eq!(propagation.tree.roots().len(), n_points.min(1), "{}", preset.name());
+            }
         }
     }
 }
@@ -164,14 +213,14 @@ fn ks_outside_their_range_count_as_the_nearest() {
     let parameters = Parameters {
         k_normals: 0,
         k_graph: 0,
-        ..Parameters::default()
+        ..Preset::Tree.parameters()
     };
     let low = Propagation::new(&cloud, None, parameters, &Silent).unwrap();
     assert_eq!(low.parameters, parameters);
     let parameters = Parameters {
         k_normals: 3,
         k_graph: 1,
-        ..Parameters::default()
+        ..Preset::Tree.parameters()
     };
     let nearest = Propagation::new(&cloud, None, parameters, &Silent).unwrap();
     assert_eq!(low.normals, nearest.normals);
@@ -192,11 +241,17 @@ fn cancels_in_every_stage() {
         }
     }
     let cloud = sheets(40, 1);
-    let count = StopAt(usize::MAX, AtomicUsize::new(0));
-    Propagation::new(&cloud, None, Parameters::default(), &count).unwrap();
-    for stop in 0..count.1.into_inner() {
-        let result = Propagation::new(&cloud, None, Parameters::default(), &StopAt(stop, AtomicUsize::new(0)));
-        assert!(matches!(result, Err(Cancelled)), "report {stop}");
+    for preset in [Preset::Auto, Preset::Tree] {
+        let run = |stop| {
+            let progress = StopAt(stop, AtomicUsize::new(0));
+            let result = Propagation::new(&cloud, None, preset.parameters(), &progress);
+            (result.map(drop), progress.1.into_inner())
+        };
+        let (result, n_reports) = run(usize::MAX);
+        result.unwrap();
+        for stop in 0..n_reports {
+            assert_eq!(run(stop).0, Err(Cancelled), "{}: report {stop}", preset.name());
+        }
     }
 }
 
@@ -209,7 +264,7 @@ fn start(positions: &[Vec3], estimator: Estimator) -> Vec<Vec3> {
     let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec()).unwrap();
     let parameters = Parameters {
         estimator,
-        ..Parameters::default()
+        ..Preset::Tree.parameters()
     };
     Propagation::new(&cloud, None, parameters, &Silent)
         .unwrap()

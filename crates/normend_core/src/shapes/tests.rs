@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use super::*;
-use crate::{Document, EdgeRule, Edit, Parameters, PointCloud, Propagation, Silent, metrics};
+use crate::{Document, EdgeRule, Edit, Parameters, PointCloud, Preset, Propagation, Silent, metrics};
 
 /// The normals that a propagation starts with, before any source.
 fn start(cloud: &PointCloud, parameters: Parameters) -> (Propagation, Vec<Vec3>) {
@@ -92,14 +92,15 @@ fn closed_shapes_come_out_right() {
     ] {
         let shape = kind.generate(10_000).with_noise(noise, 3);
         let cloud = cloud(&shape);
-        let (_, normals) = start(&cloud, Parameters::default());
-        let comparison = metrics::compare(&cloud, &shape.normals, &normals, &Silent).unwrap();
-        assert!(
-            comparison.n_wrong <= most_wrong,
-            "{}: {}",
-            kind.name(),
-            comparison.n_wrong
-        );
+        for preset in [Preset::Auto, Preset::Tree] {
+            let (_, normals) = start(&cloud, preset.parameters());
+            let n_wrong = metrics::compare(&cloud, &shape.normals, &normals, &Silent)
+                .unwrap()
+                .n_wrong;
+            // The automatic method fits normals again to what its first signs put together, which may tilt one too far.
+            let most_wrong = most_wrong + usize::from(preset == Preset::Auto);
+            assert!(n_wrong <= most_wrong, "{} {}: {n_wrong}", kind.name(), preset.name());
+        }
     }
 }
 
@@ -110,7 +111,7 @@ fn reflection_orients_a_plate_thinner_than_its_spacing() {
     let wrong = |edge_rule: EdgeRule| {
         let parameters = Parameters {
             edge_rule,
-            ..Parameters::default()
+            ..Preset::Tree.parameters()
         };
         let (_, normals) = start(&cloud, parameters);
         metrics::compare(&cloud, &shape.normals, &normals, &Silent)
@@ -121,15 +122,15 @@ fn reflection_orients_a_plate_thinner_than_its_spacing() {
     assert!(dot > 2000 && reflection < dot / 4, "{dot} {reflection}");
 }
 
-/// The sample has what a new user needs: most is right, one patch in plain sight is wrong, and a click anywhere on it
-/// mends it.
+/// The sample has what a new user needs: the spanning tree leaves most right and one patch in plain sight wrong, a click anywhere
+/// on it mends it, and the automatic method leaves next to nothing wrong.
 #[test]
 fn the_sample_has_one_wrong_patch() {
     let shape = sample_part();
     let cloud = Arc::new(cloud(&shape));
-    assert_eq!(cloud.n_points(), 80_000);
+    assert_eq!(cloud.n_points(), 60_000);
     let mut document = Document::new(Arc::clone(&cloud), None);
-    document.install(Propagation::new(&cloud, None, Parameters::default(), &Silent).unwrap());
+    document.install(Propagation::new(&cloud, None, Preset::Tree.parameters(), &Silent).unwrap());
     let wrong = |document: &Document| {
         let normals = document.oriented_normals().unwrap();
         metrics::compare(&cloud, &shape.normals, &normals, &Silent)
@@ -145,7 +146,7 @@ fn the_sample_has_one_wrong_patch() {
         let position = shape.positions[*point];
         (position - Vec3::new(0.0, 0.0, 48.0)).length() < 18.5 && position.y.abs() < 13.0
     };
-    let seat: Vec<usize> = (0..80_000).filter(is_deep_in_seat).collect();
+    let seat: Vec<usize> = (0..60_000).filter(is_deep_in_seat).collect();
     assert!(seat.iter().all(|&point| before.contains(point)));
     assert!(seat.len() > n_wrong * 8 / 10, "{} of {n_wrong}", seat.len());
 
@@ -155,4 +156,8 @@ fn the_sample_has_one_wrong_patch() {
         assert!(after < 80, "{after}");
         document.undo().unwrap();
     }
+
+    document.install(Propagation::new(&cloud, None, Preset::Auto.parameters(), &Silent).unwrap());
+    let n_wrong = wrong(&document).count_ones(..);
+    assert!(n_wrong < 60, "{n_wrong}");
 }
