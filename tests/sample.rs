@@ -1,5 +1,7 @@
 //! The bundled sample is what its generator makes: a part whose normals, as given, leave a patch to mend.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests fail as tests do, by panicking")]
+
 use std::path::Path;
 use std::sync::Arc;
 
@@ -17,7 +19,7 @@ fn opened(scan: &Scan) -> Document {
         ..Parameters::default()
     };
     let given = scan.given_normals.as_ref().unwrap();
-    let propagation = Propagation::new(&scan.cloud, given.as_slice(), parameters, &Silent).unwrap();
+    let propagation = Propagation::new(&scan.cloud, Some(given.as_slice()), parameters, &Silent).unwrap();
     let mut document = Document::new(Arc::clone(&scan.cloud), scan.given_normals.clone());
     document.install(propagation);
     document

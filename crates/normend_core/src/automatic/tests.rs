@@ -253,8 +253,8 @@ fn evidence_decides_where_couplings_do_not() {
 #[test]
 fn couplings_follow_what_was_counted() {
     // A step between two level sheets: reflection takes the edge for a mirror, the evidence knows better.
-    let positions = vec![Vec3::ZERO, Vec3::new(0.5, 0.0, 1.0)];
-    let normals = vec![Vec3::Z; 2];
+    let positions = [Vec3::ZERO, Vec3::new(0.5, 0.0, 1.0)];
+    let normals = [Vec3::Z; 2];
     let copies = 500;
     let positions: Vec<Vec3> = (0..copies)
         .flat_map(|i| {
