@@ -266,7 +266,8 @@ The output's extension says its format; without one, or with the input's, it is 
 
 The report (--json) has a line for each input: an object with input, output, points, left_out (rows without finite \
 coordinates), components, sources (places where signs start), voted_sources (those found by visibility), \
-without_evidence (components that no evidence tells the side of), parameters, seconds (read, neighbors, normals, \
+without_evidence (components that no evidence tells the side of), undecided (points whose sign is no more than a guess; null \
+where the method does not know), parameters, seconds (read, neighbors, normals, \
 sources where voted, graph, tree, signs, write, total) and peak_rss_bytes (of the program so far; null where the system \
 does not tell). A failed input has input and error.
 
@@ -297,6 +298,11 @@ pub struct OrientArguments {
     /// Where the scanner stood.
     #[command(flatten)]
     pub scanner: ScannerArguments,
+
+    /// Write how sure each normal is of its side: confidence (of points at 0.9 nine in ten are right) and oriented (0 where the
+    /// side is no more than a guess). For the preset auto; to PLY from PLY, or text whose columns have names
+    #[arg(long)]
+    pub confidence: bool,
 
     /// Write a report, a JSON object a line, to FILE or to standard output (-)
     #[arg(long, value_name = "FILE")]

@@ -58,6 +58,15 @@ pub enum WriteError {
         /// What it is and what to do.
         reason: &'static str,
     },
+    /// The target cannot hold confidence.
+    #[error(
+        "{} cannot hold confidence: write a PLY file from a PLY file (without lists named confidence or oriented), or text from text whose columns have names",
+        path.display()
+    )]
+    NoConfidence {
+        /// The target.
+        path: PathBuf,
+    },
     /// Not one normal for each point.
     #[error("{n_normals} normals were given for {n_points} points: give one for each")]
     Count {

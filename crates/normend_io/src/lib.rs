@@ -24,6 +24,9 @@ mod save;
 
 mod stations;
 
+#[cfg(test)]
+mod confidence_tests;
+
 use std::ffi::OsStr;
 use std::fmt;
 use std::fs::{self, File};
@@ -302,15 +305,52 @@ impl Scan {
         options: &WriteOptions,
         progress: &dyn Progress,
     ) -> Result<(), WriteError> {
+        self.write_with_confidence(normals, None, path, options, progress)
+    }
+
+    /// Whether a file of this format can hold confidence: PLY from PLY, or text from text whose columns have names.
+    fn can_hold_confidence(&self, format: FileFormat) -> bool {
+        match (&self.file.layout, format) {
+            (SourceLayout::Ply(ply), FileFormat::Ply) => ply.can_hold_side(),
+            (SourceLayout::Xyz(xyz), FileFormat::Xyz) => xyz.can_hold_side(),
+            _ => false,
+        }
+    }
+
+    /// Like [`Self::write`], with how sure each normal is of its side (by point, in units of 1/255) when it is given: as
+    /// `float confidence` in 0..=1, and `uchar oriented`, 0 where that is no more than a guess. Both stand after the normal, or
+    /// where the file has such values already. A row that is no point keeps what it has, or gets 0.
+    ///
+    /// # Errors
+    /// [`WriteError`]; the target is as it was then.
+    pub fn write_with_confidence(
+        &self,
+        normals: &[Vec3],
+        confidence: Option<&[u8]>,
+        path: &Path,
+        options: &WriteOptions,
+        progress: &dyn Progress,
+    ) -> Result<(), WriteError> {
         progress.stage("Writing");
         let format = FileFormat::of_target(path, self.path().map(PathBuf::as_path))?.unwrap_or(self.format);
         check_normals(normals, self.cloud.n_points())?;
+        if let Some(confidence) = confidence {
+            if confidence.len() != normals.len() {
+                return Err(WriteError::Count {
+                    n_normals: confidence.len(),
+                    n_points: normals.len(),
+                });
+            }
+            if !self.can_hold_confidence(format) {
+                return Err(WriteError::NoConfidence { path: path.to_owned() });
+            }
+        }
         if !options.overwrite_input && self.path().is_some_and(|input| save::is_same_file(input, path)) {
             return Err(WriteError::OverInput { path: path.to_owned() });
         }
         let layout = self.file.layout.as_layout();
         let bytes = &self.file.bytes[..];
-        let row_normals = RowNormals::new(normals, self.rows.as_ref().map(|rows| rows.as_slice()));
+        let row_normals = RowNormals::new(normals, confidence, self.rows.as_ref().map(|rows| rows.as_slice()));
         let comment = comment(&options.rule);
         save::replace(path, |out| {
             let io = WriteError::io(path);
@@ -319,7 +359,7 @@ impl Scan {
                 (SourceLayout::Ply(ply), FileFormat::Ply) => rewrite(
                     layout,
                     bytes,
-                    &ply.header_edits(&comment),
+                    &ply.header_edits(&comment, confidence.is_some()),
                     row_normals,
                     &mut write,
                     progress,
@@ -327,7 +367,7 @@ impl Scan {
                 (SourceLayout::Xyz(xyz), FileFormat::Xyz) => rewrite(
                     layout,
                     bytes,
-                    &xyz.header_edits(bytes),
+                    &xyz.header_edits(bytes, confidence.is_some()),
                     row_normals,
                     &mut write,
                     progress,
@@ -421,7 +461,7 @@ pub fn write_points(
             Positions::Float(_) => Scalar::Float,
             Positions::Double(_) => Scalar::Double,
         },
-        normals: normals.map(|normals| RowNormals::new(normals, None)),
+        normals: normals.map(|normals| RowNormals::new(normals, None, None)),
         comment: None,
     };
     save::replace(path, |out| {

@@ -2,30 +2,43 @@
 
 use glam::Vec3;
 use normend_core::Progress;
+use normend_core::confidence::UNDECIDED;
 
 use crate::error::{Stop, WriteError};
 use crate::new_file::TextStyle;
-use crate::table::{Layout, Part, Span, Spans, for_each_part};
+use crate::table::{Layout, N_VALUES, NORMAL, Part, SIDE, Span, Spans, for_each_part};
 use crate::value::{Scalar, ValueType, push_number};
 
 /// What a row gets that is no point, because a coordinate is not finite, where the file has no normal to keep.
 pub(crate) const NO_NORMAL: Vec3 = Vec3::Z;
 
-/// The new normals by row of the file.
+/// The new normals by row of the file, and how sure they are of their sides.
 #[derive(Clone, Copy)]
 pub(crate) struct RowNormals<'a> {
     normals: &'a [Vec3],
+    /// By point, in units of 1/255; `None` when it is not written.
+    confidence: Option<&'a [u8]>,
     /// The row of each point, ascending; `None` when every row is a point.
     rows: Option<&'a [u32]>,
 }
 
 impl<'a> RowNormals<'a> {
-    pub fn new(normals: &'a [Vec3], rows: Option<&'a [u32]>) -> Self {
-        Self { normals, rows }
+    pub fn new(normals: &'a [Vec3], confidence: Option<&'a [u8]>, rows: Option<&'a [u32]>) -> Self {
+        Self {
+            normals,
+            confidence,
+            rows,
+        }
     }
 
     /// The normals of the rows from `first_row` on, without end; `None` for a row that is no point.
     pub fn since_row(self, first_row: usize) -> impl Iterator<Item = Option<Vec3>> + 'a {
+        let points = self.points_since_row(first_row);
+        points.map(move |point| self.normals.get(point?).copied())
+    }
+
+    /// The points of the rows from `first_row` on, without end; `None` for a row that is no point.
+    fn points_since_row(self, first_row: usize) -> impl Iterator<Item = Option<usize>> + 'a {
         let mut point = self.rows.map_or(first_row, |rows| {
             rows.partition_point(|row| (*row as usize) < first_row)
         });
@@ -37,7 +50,7 @@ impl<'a> RowNormals<'a> {
                 return None;
             }
             point += 1;
-            self.normals.get(point - 1).copied()
+            (point <= self.normals.len()).then_some(point - 1)
         })
     }
 }
@@ -78,45 +91,84 @@ fn rewrite_part(
     let table = layout.table();
     let mut rows = layout.rows(bytes, part.bytes.start);
     let mut done = part.bytes.start;
-    for normal in normals.since_row(part.first_row).take(part.n_rows) {
+    let anchor = table.anchor();
+    for point in normals.points_since_row(part.first_row).take(part.n_rows) {
         let Some(spans) = rows.next_row()? else {
             break;
         };
-        if table.has_normals {
-            let change = Change::between(table.types, bytes, &spans, normal);
-            for &component in &table.normal_order {
-                let span = spans[3 + component];
+        let normal = point.and_then(|point| normals.normals.get(point).copied());
+        let confidence = normals
+            .confidence
+            .map(|confidence| point.map(|point| confidence[point]));
+        let change = Change::between(&table.types, bytes, &spans, normal);
+        for &slot in &table.order {
+            let (span, value_type) = (spans[slot], table.types[slot]);
+            if NORMAL.contains(&slot) {
                 out.extend_from_slice(&bytes[done..span.start]);
-                change.write(table.types[3 + component], component, span.of(bytes), out);
+                change.write(value_type, slot - NORMAL.start, span.of(bytes), out);
+                done = span.end;
+            } else if let (true, Some(Some(confidence))) = (SIDE.contains(&slot), confidence) {
+                out.extend_from_slice(&bytes[done..span.start]);
+                write_side(slot, confidence, value_type, out);
                 done = span.end;
             }
-        } else {
-            let last = spans[..3]
-                .iter()
-                .max_by_key(|span| span.end)
-                .copied()
-                .unwrap_or_default();
-            out.extend_from_slice(&bytes[done..last.end]);
-            insert(layout, bytes, last, normal.unwrap_or(NO_NORMAL), out);
-            done = last.end;
+            if slot == anchor {
+                out.extend_from_slice(&bytes[done..span.end]);
+                done = span.end;
+                insert(layout, bytes, span, (normal, confidence), out);
+            }
         }
     }
     out.extend_from_slice(&bytes[done..part.bytes.end]);
     Ok(())
 }
 
-/// Appends a normal after the coordinates of a row, the last of which is at `last`.
-fn insert(layout: &dyn Layout, bytes: &[u8], last: Span, normal: Vec3, out: &mut Vec<u8>) {
-    let value_type = match layout.table().types[0] {
-        ValueType::Text => ValueType::Text,
-        ValueType::LittleEndian(_) => ValueType::LittleEndian(Scalar::Float),
-        ValueType::BigEndian(_) => ValueType::BigEndian(Scalar::Float),
-    };
-    for component in normal.to_array() {
+/// Appends the values of a row that the file does not have after the one at `last`. A row that is no point is not sure of
+/// anything.
+fn insert(
+    layout: &dyn Layout,
+    bytes: &[u8],
+    last: Span,
+    (normal, confidence): (Option<Vec3>, Option<Option<u8>>),
+    out: &mut Vec<u8>,
+) {
+    let table = layout.table();
+    for slot in NORMAL.start..SIDE.end {
+        let is_written = NORMAL.contains(&slot) || confidence.is_some();
+        if table.has(slot) || !is_written {
+            continue;
+        }
+        let value_type = match table.types[0] {
+            ValueType::Text => ValueType::Text,
+            ValueType::LittleEndian(_) => ValueType::LittleEndian(new_type(slot)),
+            ValueType::BigEndian(_) => ValueType::BigEndian(new_type(slot)),
+        };
         if value_type == ValueType::Text {
             out.extend_from_slice(separator_before(layout, bytes, last.start));
         }
-        value_type.write(component, out);
+        if NORMAL.contains(&slot) {
+            value_type.write(normal.unwrap_or(NO_NORMAL)[slot - NORMAL.start], out);
+        } else {
+            write_side(slot, confidence.flatten().unwrap_or(0), value_type, out);
+        }
+    }
+}
+
+/// The type of a value that the file did not have.
+fn new_type(slot: usize) -> Scalar {
+    if slot + 1 == SIDE.end {
+        Scalar::UChar
+    } else {
+        Scalar::Float
+    }
+}
+
+/// Appends confidence as a number in 0..=1, or whether it is enough to call the normal oriented: 1 or 0.
+fn write_side(slot: usize, confidence: u8, value_type: ValueType, out: &mut Vec<u8>) {
+    if slot == SIDE.start {
+        value_type.write(f32::from(confidence) / 255.0, out);
+    } else {
+        value_type.write_flag(confidence > UNDECIDED, out);
     }
 }
 
@@ -141,10 +193,13 @@ enum Change {
 }
 
 impl Change {
-    fn between(types: [ValueType; 6], bytes: &[u8], spans: &Spans, normal: Option<Vec3>) -> Self {
+    fn between(types: &[ValueType; N_VALUES], bytes: &[u8], spans: &Spans, normal: Option<Vec3>) -> Self {
         let Some(normal) = normal else {
             return Self::Keep;
         };
+        if spans[NORMAL].iter().all(|span| span.start == span.end) {
+            return Self::Replace(normal);
+        }
         let former = |component: usize| {
             let value = types[3 + component].read(spans[3 + component].of(bytes));
             value.map_or(f32::NAN, |value| value as f32)

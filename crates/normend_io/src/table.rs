@@ -3,6 +3,7 @@
 //! A format says where the numbers of a row are ([`Rows`]); reading and rewriting work on parts of [`PART_ROWS`] rows, in
 //! parallel, the same for all formats.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DVec3, Vec3};
@@ -34,8 +35,17 @@ pub(crate) fn next_token(bytes: &[u8], at: usize) -> Option<Span> {
     })
 }
 
-/// Names of the six values of a row that are read, in the order of [`Spans`].
-pub(crate) const VALUE_NAMES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
+/// Names of the values of a row that are read or written, in the order of [`Spans`]. The last two are only written: how sure
+/// the normal is of its side, and whether that is more than nothing.
+pub(crate) const VALUE_NAMES: [&str; N_VALUES] = ["x", "y", "z", "nx", "ny", "nz", "confidence", "oriented"];
+/// The number of such values.
+pub(crate) const N_VALUES: usize = 8;
+/// Which of them are coordinates.
+pub(crate) const COORDINATES: Range<usize> = 0..3;
+/// Which of them are a normal's.
+pub(crate) const NORMAL: Range<usize> = 3..6;
+/// Which of them are about the normal's side.
+pub(crate) const SIDE: Range<usize> = 6..8;
 
 /// A range of bytes of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,8 +60,8 @@ impl Span {
     }
 }
 
-/// Where a row has x y z nx ny nz; the last three are empty in a table without normals.
-pub(crate) type Spans = [Span; 6];
+/// Where a row has each value; empty where it does not.
+pub(crate) type Spans = [Span; N_VALUES];
 
 /// Goes through the rows of a file.
 pub(crate) trait Rows {
@@ -66,11 +76,11 @@ pub(crate) trait Rows {
 #[derive(Clone, Debug)]
 pub(crate) struct Table {
     pub n_rows: usize,
-    /// Types of x y z nx ny nz.
-    pub types: [ValueType; 6],
+    /// Types of the values, by slot.
+    pub types: [ValueType; N_VALUES],
     pub has_normals: bool,
-    /// The order of nx, ny, nz in a row: indices into 0..3.
-    pub normal_order: [usize; 3],
+    /// The slots that rows have, in the order in which they stand there.
+    pub order: Vec<usize>,
     pub starts: Starts,
     /// The byte after the last row.
     pub end: usize,
@@ -94,6 +104,18 @@ pub(crate) struct Part {
 }
 
 impl Table {
+    /// Whether rows have the value of a slot.
+    pub fn has(&self, slot: usize) -> bool {
+        self.order.contains(&slot)
+    }
+
+    /// The slot after which new values go: the last of the normal, or of the coordinates where there is none.
+    pub fn anchor(&self) -> usize {
+        let range = if self.has_normals { NORMAL } else { COORDINATES };
+        let last = self.order.iter().rev().find(|&&slot| range.contains(&slot));
+        last.copied().unwrap_or(2)
+    }
+
     pub fn n_parts(&self) -> usize {
         self.n_rows.div_ceil(PART_ROWS)
     }

@@ -76,6 +76,22 @@ impl ValueType {
         }
     }
 
+    /// Appends 1 or 0 as a number of this type.
+    pub fn write_flag(self, is_set: bool, out: &mut Vec<u8>) {
+        match self {
+            Self::LittleEndian(scalar) | Self::BigEndian(scalar) if !scalar.is_float() => {
+                let first = out.len();
+                out.resize(first + scalar.size(), 0);
+                let lowest = match self {
+                    Self::BigEndian(_) => out.len() - 1,
+                    Self::Text | Self::LittleEndian(_) => first,
+                };
+                out[lowest] = u8::from(is_set);
+            }
+            _ => self.write(f32::from(u8::from(is_set)), out),
+        }
+    }
+
     /// Appends `bytes`, a number of this type (text, `float` or `double`), with the opposite sign and nothing else
     /// changed; zero stays.
     pub fn write_negated(self, bytes: &[u8], out: &mut Vec<u8>) {

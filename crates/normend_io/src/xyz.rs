@@ -7,7 +7,9 @@
 use normend_core::{PointCloud, Progress};
 
 use crate::error::{Broken, Place, Stop, quoted};
-use crate::table::{Layout, Rows, Span, Spans, Starts, Table, VALUE_NAMES, find_parts, is_space};
+use crate::table::{
+    Layout, N_VALUES, NORMAL, Rows, SIDE, Span, Spans, Starts, Table, VALUE_NAMES, find_parts, is_space,
+};
 use crate::value::{ValueType, parse};
 
 /// Rows looked at to tell normals from colors.
@@ -22,8 +24,8 @@ pub(crate) struct XyzLayout {
     names: Option<Span>,
     /// Whether lines with a single number announce how many points follow, as in PTS files.
     has_counts: bool,
-    /// The columns of x y z nx ny nz; those of the normal only count when there is one.
-    columns: [usize; 6],
+    /// The column of each value, by slot.
+    columns: [Option<usize>; N_VALUES],
     table: Table,
 }
 
@@ -37,21 +39,21 @@ pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<XyzLayout, S
         line_end,
         names: None,
         has_counts: false,
-        columns: [0, 1, 2, 3, 4, 5],
+        columns: UNNAMED,
         table: Table {
             n_rows: 0,
-            types: [ValueType::Text; 6],
+            types: [ValueType::Text; N_VALUES],
             has_normals: false,
-            normal_order: [0, 1, 2],
+            order: Vec::new(),
             starts: Starts::Parts(Vec::new()),
             end: 0,
         },
     };
     let start = layout.find_columns(bytes)?;
-    layout
-        .table
-        .normal_order
-        .sort_unstable_by_key(|component| layout.columns[3 + component]);
+    layout.table.has_normals = layout.columns[NORMAL].iter().all(Option::is_some);
+    let mut order: Vec<usize> = (0..N_VALUES).filter(|&slot| layout.columns[slot].is_some()).collect();
+    order.sort_unstable_by_key(|&slot| layout.columns[slot]);
+    layout.table.order = order;
     let mut rows = XyzRows::new(&layout, bytes, start);
     let (starts, n_rows, end) = find_parts(&mut rows, PointCloud::MAX_POINTS + 1, bytes.len(), progress)?;
     if let Some((announced, line)) = rows.missing() {
@@ -148,15 +150,16 @@ impl XyzLayout {
         let named = names
             .iter()
             .find_map(|names| Some((*names, columns_by_name(names.of(bytes))?)));
-        if let Some((names, (columns, has_normals))) = named {
+        if let Some((names, columns)) = named {
             self.names = Some(names);
             self.columns = columns;
-            self.table.has_normals = has_normals;
             // Names in a comment: the rows begin after it, because export may add names.
             row_start = row_start.max(names.end);
         } else {
             self.names = title.filter(|title| names.contains(title));
-            self.table.has_normals = self.sample_is_normals(bytes, lines);
+            if self.sample_is_normals(bytes, lines) {
+                self.columns[NORMAL].copy_from_slice(&[Some(3), Some(4), Some(5)]);
+            }
         }
         Ok(row_start)
     }
@@ -219,13 +222,24 @@ impl XyzLayout {
         n_units > 0
     }
 
-    /// What changes before the first row when normals are written: the names of their columns, if columns have names.
-    pub(crate) fn header_edits(&self, bytes: &[u8]) -> Vec<(Span, Vec<u8>)> {
-        let (Some(names), false) = (self.names, self.table.has_normals) else {
+    /// Whether confidence can be written: without names nobody would know what the columns are, nor which are a normal's.
+    pub(crate) fn can_hold_side(&self) -> bool {
+        self.names.is_some()
+    }
+
+    /// What changes before the first row when normals, and `with_side` confidence, are written: the names of their columns, if
+    /// columns have names.
+    pub(crate) fn header_edits(&self, bytes: &[u8], with_side: bool) -> Vec<(Span, Vec<u8>)> {
+        let written = if with_side { NORMAL.start..SIDE.end } else { NORMAL };
+        let new_names: Vec<&str> = written
+            .filter(|&slot| self.columns[slot].is_none())
+            .map(|slot| VALUE_NAMES[slot])
+            .collect();
+        let (Some(names), false) = (self.names, new_names.is_empty()) else {
             return Vec::new();
         };
         let content = names.of(bytes);
-        let last = self.columns[..3].iter().max().map_or(2, |last| *last);
+        let last = self.columns[self.table.anchor()].unwrap_or(2);
         let Some(name) = Values::new(content).nth(last) else {
             return Vec::new();
         };
@@ -233,11 +247,14 @@ impl XyzLayout {
         let name = name.of(content);
         let separator = crate::rewrite::separator_before(self, bytes, at - name.len());
         let mut insertion = Vec::new();
-        for new_name in &VALUE_NAMES[3..] {
+        for new_name in new_names {
             insertion.extend_from_slice(separator);
             let is_capital = name.first().is_some_and(u8::is_ascii_uppercase);
-            insertion.push(if is_capital { b'N' } else { b'n' });
-            insertion.extend_from_slice(&new_name.as_bytes()[1..]);
+            let first = insertion.len();
+            insertion.extend_from_slice(new_name.as_bytes());
+            if is_capital {
+                insertion[first].make_ascii_uppercase();
+            }
         }
         vec![(Span { start: at, end: at }, insertion)]
     }
@@ -288,8 +305,11 @@ fn plain_name(name: &[u8]) -> String {
         .collect()
 }
 
-/// The columns of x y z nx ny nz by their names, and whether there are normals; `None` without x, y and z.
-fn columns_by_name(line: &[u8]) -> Option<([usize; 6], bool)> {
+/// The columns of a text without names and normals.
+const UNNAMED: [Option<usize>; N_VALUES] = [Some(0), Some(1), Some(2), None, None, None, None, None];
+
+/// The columns of values by their names; `None` without x, y and z.
+fn columns_by_name(line: &[u8]) -> Option<[Option<usize>; N_VALUES]> {
     let names: Vec<String> = Values::new(line).map(|name| plain_name(name.of(line))).collect();
     let find = |wanted: &[&str]| names.iter().position(|name| wanted.contains(&name.as_str()));
     let [x, y, z] = [find(&["x"])?, find(&["y"])?, find(&["z"])?];
@@ -300,8 +320,9 @@ fn columns_by_name(line: &[u8]) -> Option<([usize; 6], bool)> {
             find(&["nz", "normal_z", "normalz"])?,
         ])
     })();
-    let [nx, ny, nz] = normal.unwrap_or([0; 3]);
-    Some(([x, y, z, nx, ny, nz], normal.is_some()))
+    let [nx, ny, nz] = normal.map_or([None; 3], |columns| columns.map(Some));
+    let [confidence, oriented] = [find(&["confidence"]), find(&["oriented"])];
+    Some([Some(x), Some(y), Some(z), nx, ny, nz, confidence, oriented])
 }
 
 /// Whether a line holds no point: a comment or nothing.
@@ -393,8 +414,8 @@ struct XyzRows<'a> {
 
 impl<'a> XyzRows<'a> {
     fn new(layout: &'a XyzLayout, bytes: &'a [u8], start: usize) -> Self {
-        let columns = &layout.columns[..if layout.table.has_normals { 6 } else { 3 }];
-        let n_columns = 1 + columns.iter().max().map_or(0, |last| *last);
+        let columns = &layout.columns;
+        let n_columns = columns.iter().flatten().max().map_or(0, |last| last + 1);
         Self {
             layout,
             bytes,
@@ -404,7 +425,7 @@ impl<'a> XyzRows<'a> {
                 at: start,
             },
             slots: (0..n_columns)
-                .map(|column| columns.iter().position(|wanted| *wanted == column))
+                .map(|column| columns.iter().position(|wanted| *wanted == Some(column)))
                 .collect(),
             announced: None,
         }

@@ -157,7 +157,7 @@ same; the clouds with one and on how many of them there is a suspect; and on the
 its points are wrong: of the first ones, the first three, and all.
 
 The table below has the points by the confidence of the automatic method: where a bin begins, how many points, their mean \
-confidence, and the share that is right.
+confidence, and the share that is right. The class real is left out of it, where the side of an unknown scanner is asked for.
 
 Examples:
   normend bench suspects generated/

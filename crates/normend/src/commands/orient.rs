@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::Context;
-use normend_core::progress::Part;
+use normend_core::confidence::{confidence, n_undecided};
 use normend_core::evidence::Known;
-use normend_core::{Document, EditError, Parameters, Progress, Propagation, SideRule, Start};
+use normend_core::progress::Part;
+use normend_core::{Document, EditError, Method, Parameters, Progress, Propagation, SideRule, Start};
 use normend_io::WriteOptions;
 use serde::{Serialize, Serializer};
 
@@ -54,6 +55,8 @@ struct Oriented {
     sources: usize,
     voted_sources: usize,
     without_evidence: usize,
+    /// Null where the method does not know.
+    undecided: Option<usize>,
     #[serde(serialize_with = "serialize_parameters")]
     parameters: Parameters,
     seconds: Seconds,
@@ -165,6 +168,12 @@ fn plan(arguments: &OrientArguments) -> anyhow::Result<Plan> {
     if arguments.propagation.rule == Some(SideRule::TowardScanner) && !arguments.scanner.is_given() {
         return Err(wrong_use(
             "the rule toward-scanner needs the scanner's place: give --scanner X,Y,Z or --sensors TSV",
+        ));
+    }
+    let Parameters { method, start, .. } = arguments.propagation.into();
+    if arguments.confidence && (method != Method::Agglomeration || start == Start::Keep) {
+        return Err(wrong_use(
+            "--confidence is known for the automatic method only: leave out the flags of other methods and --start keep",
         ));
     }
     if arguments.scanner.sensors.is_some() && arguments.inputs.len() > 1 {
@@ -289,6 +298,7 @@ fn orient(job: &Job, parameters: Parameters, arguments: &OrientArguments, bar: &
     let without_evidence = propagation.sides.iter().filter(|side| side.rule.is_none()).count();
 
     let signs_started = Instant::now();
+    let sureness = confidence(&propagation);
     let rule = propagation.rule();
     let mut document = Document::new(scan.cloud.clone(), scan.given_normals.clone());
     document.install(propagation);
@@ -303,7 +313,8 @@ fn orient(job: &Job, parameters: Parameters, arguments: &OrientArguments, bar: &
     };
     let writing = Part::new(bar, 0.9..1.0);
     writing.report(0.0)?;
-    scan.write(&normals, &job.output, &options, &writing)?;
+    let written = sureness.as_deref().filter(|_| arguments.confidence);
+    scan.write_with_confidence(&normals, written, &job.output, &options, &writing)?;
     seconds.0.push(("write", write_started.elapsed().as_secs_f64()));
     seconds.0.push(("total", started.elapsed().as_secs_f64()));
 
@@ -316,6 +327,7 @@ fn orient(job: &Job, parameters: Parameters, arguments: &OrientArguments, bar: &
         sources,
         voted_sources,
         without_evidence,
+        undecided: sureness.as_deref().map(n_undecided),
         parameters,
         seconds,
         peak_rss_bytes: peak_rss_bytes(),

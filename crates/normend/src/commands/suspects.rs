@@ -68,14 +68,12 @@ pub fn run(arguments: &SuspectsArguments) -> anyhow::Result<Outcome> {
         given: scan.given_normals.as_ref().map(|normals| normals.as_slice()),
         stations: &arguments.scanner.stations(&scan)?,
     };
+    let usual = Parameters::default();
     let rule = match arguments.rule {
         None if arguments.scanner.is_given() => SideRule::TowardScanner,
-        rule => rule.unwrap_or_default(),
+        rule => rule.unwrap_or(usual.rule),
     };
-    let parameters = Parameters {
-        rule,
-        ..Parameters::default()
-    };
+    let parameters = Parameters { rule, ..usual };
     let automatic = Propagation::new(&scan.cloud, known, parameters, &Part::new(&bar, 0.1..0.9))?;
     let initial;
     let normals = match known.given {

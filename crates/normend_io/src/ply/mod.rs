@@ -6,6 +6,8 @@
 mod header;
 mod rows;
 
+use std::ops::Range;
+
 use normend_core::{PointCloud, PointCloudError, Progress};
 use ply_rs::ply::Encoding;
 
@@ -13,7 +15,9 @@ pub(crate) use self::header::sniff;
 use self::header::{Element, Header, Kind};
 use self::rows::{FixedRows, WalkedRows, skip_element};
 use crate::error::{Broken, Place, Stop, quoted};
-use crate::table::{Layout, Rows, Span, Starts, Table, VALUE_NAMES, find_parts, is_space};
+use crate::table::{
+    COORDINATES, Layout, N_VALUES, NORMAL, Rows, SIDE, Span, Starts, Table, VALUE_NAMES, find_parts, is_space,
+};
 use crate::value::Scalar;
 
 /// A PLY file whose parts are known.
@@ -22,17 +26,23 @@ pub(crate) struct PlyLayout {
     header: Header,
     /// Index of the element `vertex`.
     vertex: usize,
-    /// Which properties of `vertex` are x y z nx ny nz.
+    /// Which properties of `vertex` are the values of a row.
     slots: Slots,
     table: Table,
 }
 
-/// Which properties of the element `vertex` are x y z nx ny nz.
+/// Which properties of the element `vertex` are the values of a row.
 #[derive(Clone, Copy, Debug)]
 struct Slots {
-    /// Indices of properties; those of the normal only count when there is one.
-    properties: [usize; 6],
-    has_normals: bool,
+    /// Indices of properties, by slot.
+    properties: [Option<usize>; N_VALUES],
+}
+
+impl Slots {
+    /// Whether all values of a range of slots are there.
+    fn has(&self, range: Range<usize>) -> bool {
+        self.properties[range].iter().all(Option::is_some)
+    }
 }
 
 /// Finds out where everything is in a PLY file, and refuses broken ones.
@@ -46,20 +56,23 @@ pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<PlyLayout, S
         at = skip_element(bytes, &header, element, at, progress)?;
     }
     let element = &header.elements[vertex];
-    let scalar = |slot: usize| match element.properties[slots.properties[slot]].kind {
-        Kind::Scalar(scalar) => scalar,
-        Kind::List { item, .. } => item,
+    // What is not there is written as the types that the header declares for it then.
+    let scalar = |slot: usize| match slots.properties[slot].map(|property| element.properties[property].kind) {
+        Some(Kind::Scalar(scalar)) => scalar,
+        Some(Kind::List { item, .. }) => item,
+        None if slot == SIDE.end - 1 => Scalar::UChar,
+        None => Scalar::Float,
     };
-    let mut normal_order = [0, 1, 2];
-    normal_order.sort_unstable_by_key(|component| slots.properties[3 + component]);
+    let mut order: Vec<usize> = (0..N_VALUES).filter(|&slot| slots.properties[slot].is_some()).collect();
+    order.sort_unstable_by_key(|&slot| slots.properties[slot]);
     let mut layout = PlyLayout {
         vertex,
         slots,
         table: Table {
             n_rows: element.count,
             types: std::array::from_fn(|slot| header.value_type(scalar(slot))),
-            has_normals: slots.has_normals,
-            normal_order,
+            has_normals: slots.has(NORMAL),
+            order,
             starts: Starts::Parts(Vec::new()),
             end: at,
         },
@@ -137,23 +150,26 @@ fn find_slots(element: &Element) -> Result<Slots, Broken> {
             found => Ok(found),
         }
     };
-    let mut properties = [0; 6];
-    for (slot, name) in VALUE_NAMES[..3].iter().enumerate() {
-        properties[slot] = scalar(name)?.ok_or_else(|| {
+    let mut properties = [None; N_VALUES];
+    for slot in COORDINATES {
+        let name = VALUE_NAMES[slot];
+        let found = scalar(name)?.ok_or_else(|| {
             Broken::new(
                 Place::Line(element.line),
                 format!("the element \"vertex\" has no property \"{name}\": export the file with x, y and z"),
             )
         })?;
+        properties[slot] = Some(found);
+    }
+    for slot in SIDE {
+        let is_scalar = |&index: &usize| matches!(element.properties[index].kind, Kind::Scalar(_));
+        properties[slot] = find(VALUE_NAMES[slot]).filter(is_scalar);
     }
     for names in [["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]] {
         let found = [scalar(names[0])?, scalar(names[1])?, scalar(names[2])?];
-        if let [Some(x), Some(y), Some(z)] = found {
-            properties[3..].copy_from_slice(&[x, y, z]);
-            return Ok(Slots {
-                properties,
-                has_normals: true,
-            });
+        if found.iter().all(Option::is_some) {
+            properties[NORMAL].copy_from_slice(&found);
+            return Ok(Slots { properties });
         }
         if let Some(index) = found.into_iter().flatten().next() {
             return Err(Broken::new(
@@ -165,10 +181,7 @@ fn find_slots(element: &Element) -> Result<Slots, Broken> {
             ));
         }
     }
-    Ok(Slots {
-        properties,
-        has_normals: false,
-    })
+    Ok(Slots { properties })
 }
 
 impl Layout for PlyLayout {
@@ -243,9 +256,22 @@ impl PlyLayout {
         None
     }
 
+    /// Whether confidence can be written: not where a list has its name.
+    pub(crate) fn can_hold_side(&self) -> bool {
+        let element = &self.header.elements[self.vertex];
+        SIDE.into_iter().all(|slot| {
+            let has_name = element
+                .properties
+                .iter()
+                .any(|property| property.name == VALUE_NAMES[slot]);
+            self.table.has(slot) || !has_name
+        })
+    }
+
     /// What changes before the first row when normals and `comment` are written: ranges of bytes and what takes their
     /// place, in order.
-    pub(crate) fn header_edits(&self, comment: &str) -> Vec<(Span, Vec<u8>)> {
+    /// `with_side` when confidence is written too.
+    pub(crate) fn header_edits(&self, comment: &str, with_side: bool) -> Vec<(Span, Vec<u8>)> {
         let header = &self.header;
         let line_end = header.line_end;
         let comment = comment.as_bytes().to_vec();
@@ -258,21 +284,27 @@ impl PlyLayout {
             }
         }
         let properties = &header.elements[self.vertex].properties;
-        if self.slots.has_normals {
-            for &slot in &self.slots.properties[3..] {
-                let property = &properties[slot];
-                if matches!(property.kind, Kind::Scalar(scalar) if !scalar.is_float()) {
-                    edits.push((property.type_span, b"float".to_vec()));
+        let mut lines = Vec::new();
+        let written = if with_side { NORMAL.start..SIDE.end } else { NORMAL };
+        for slot in written {
+            let is_flag = slot == SIDE.end - 1;
+            match self.slots.properties[slot].map(|index| &properties[index]) {
+                Some(property) if !is_flag => {
+                    if matches!(property.kind, Kind::Scalar(scalar) if !scalar.is_float()) {
+                        edits.push((property.type_span, b"float".to_vec()));
+                    }
+                }
+                Some(_) => {}
+                None => {
+                    let type_name = if is_flag { "uchar" } else { "float" };
+                    lines.extend_from_slice(format!("property {type_name} {}", VALUE_NAMES[slot]).as_bytes());
+                    lines.extend_from_slice(line_end);
                 }
             }
-        } else {
-            let last = self.slots.properties[..3].iter().max().map_or(0, |last| *last);
-            let at = properties[last].after_line;
-            let mut lines = Vec::new();
-            for name in &VALUE_NAMES[3..] {
-                lines.extend_from_slice(format!("property float {name}").as_bytes());
-                lines.extend_from_slice(line_end);
-            }
+        }
+        if !lines.is_empty() {
+            let anchor = self.slots.properties[self.table.anchor()];
+            let at = anchor.map_or(header.after_format, |anchor| properties[anchor].after_line);
             edits.push((Span { start: at, end: at }, lines));
         }
         edits.sort_by_key(|(span, _)| span.start);
@@ -296,7 +328,7 @@ pub(crate) fn new_header(n_points: usize, coordinates: Scalar, has_normals: bool
             .map(|name| format!("property {coordinate_type} {name}")),
     );
     if has_normals {
-        lines.extend(VALUE_NAMES[3..].iter().map(|name| format!("property float {name}")));
+        lines.extend(VALUE_NAMES[NORMAL].iter().map(|name| format!("property float {name}")));
     }
     lines.push("end_header\n".to_owned());
     lines.join("\n")

@@ -177,14 +177,9 @@ fn text_span(
     }
 }
 
-/// Which of the six values each property is, if any.
+/// Which of the values each property is, if any.
 fn slots_of_properties(element: &Element, slots: &Slots) -> Vec<Option<usize>> {
-    let n_slots = if slots.has_normals { 6 } else { 3 };
-    let slot_of = |property| {
-        slots.properties[..n_slots]
-            .iter()
-            .position(|wanted| *wanted == property)
-    };
+    let slot_of = |property| slots.properties.iter().position(|wanted| *wanted == Some(property));
     (0..element.properties.len()).map(slot_of).collect()
 }
 
