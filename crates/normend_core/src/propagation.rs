@@ -8,6 +8,7 @@ mod source_rule;
 mod splat_radii;
 
 use std::ops::RangeInclusive;
+use std::slice;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -20,7 +21,7 @@ pub use self::preset::Preset;
 use self::sides::sides;
 pub use self::source_rule::{ETA, SourceRule, VIEWS};
 use crate::automatic;
-use crate::evidence::{Evidence, Known, Origin};
+use crate::evidence::{self, Evidence, FoundStation, Known, Origin, Station};
 use crate::progress::Part;
 use crate::side_rule::{Clues, Side};
 use crate::{
@@ -105,7 +106,7 @@ impl Parameters {
         sources: SourceRule::Highest,
         views: 8,
         eta: 0.07,
-        rule: SideRule::Outward,
+        rule: SideRule::Automatic,
     };
 }
 
@@ -188,6 +189,8 @@ pub struct Propagation {
     pub sides: Vec<Side>,
     /// What is known of the side of each normal, for normals as they are stored; `None` where the method gathers none.
     pub evidence: Option<Arc<Evidence>>,
+    /// The place that all points were scanned from, where [`SideRule::Automatic`] found one.
+    pub found_station: Option<FoundStation>,
     /// Wall seconds of each stage.
     pub seconds: Vec<(Stage, f64)>,
 }
@@ -263,7 +266,9 @@ impl Propagation {
             initially_turned.set(root as usize, turned);
         }
         let mut decided = Vec::new();
-        if given.is_none() && parameters.rule != SideRule::Outward {
+        let asks_sources =
+            parameters.rule == SideRule::Automatic && known.stations.is_empty() || parameters.rule == SideRule::Outward;
+        if given.is_none() && !asks_sources {
             progress.stage("Looking for the right side");
             let mut clues = Clues::new(cloud, &normals, &splat_radii);
             clues.gather(parameters.rule, &known, &Part::new(progress, 0.9..1.0))?;
@@ -296,6 +301,7 @@ impl Propagation {
             sides: decided,
             patches: None,
             evidence: None,
+            found_station: None,
             seconds: clock.seconds,
         })
     }
@@ -321,7 +327,20 @@ impl Propagation {
         clock.finish(Stage::Normals);
 
         progress.stage("Looking at the sides");
-        let part = Part::new(progress, 0.4..0.65);
+        let found_station = if parameters.rule == SideRule::Automatic && known.stations.is_empty() {
+            evidence::find_station(cloud, &neighbors, &unoriented.normals, &Part::new(progress, 0.4..0.45))?
+        } else {
+            None
+        };
+        let station = found_station.map(|found| Station {
+            points: 0..cloud.n_points() as u32,
+            position: found.position,
+        });
+        let known = &Known {
+            stations: station.as_ref().map_or(known.stations, slice::from_ref),
+            ..*known
+        };
+        let part = Part::new(progress, 0.45..0.65);
         let evidence = automatic::gather_evidence(cloud, &neighbors, &splat_radii, &unoriented.normals, known, &part)?;
         clock.finish(Stage::Evidence);
 
@@ -373,6 +392,7 @@ impl Propagation {
             patches: Some(Arc::new(found.patches)),
             sides: decided,
             evidence: Some(Arc::new(found.evidence)),
+            found_station,
             seconds: clock.seconds,
         })
     }
@@ -392,7 +412,13 @@ impl Propagation {
         } else if self.sides.is_empty() {
             "farthest along +z up"
         } else {
-            self.parameters.rule.label()
+            let by_scanner = |side: &Side| side.rule == Some(SideRule::TowardScanner);
+            let rule = match self.parameters.rule {
+                SideRule::Automatic if self.sides.iter().any(by_scanner) => SideRule::TowardScanner,
+                SideRule::Automatic => SideRule::Outward,
+                rule => rule,
+            };
+            rule.label()
         }
     }
 

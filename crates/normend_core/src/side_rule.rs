@@ -13,8 +13,10 @@ use crate::{Cancelled, PointCloud, Progress};
 /// What the right side of a surface is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SideRule {
-    /// The side that is seen from outside: objects.
+    /// The side that the scanner stood on, where its place is known or found ([`evidence::find_station`]); else outward.
     #[default]
+    Automatic,
+    /// The side that is seen from outside: objects.
     Outward,
     /// The side that the scanner stood on.
     TowardScanner,
@@ -28,7 +30,8 @@ pub enum SideRule {
 
 impl SideRule {
     /// All rules, in the order of menus.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
+        Self::Automatic,
         Self::Outward,
         Self::TowardScanner,
         Self::Up,
@@ -39,6 +42,7 @@ impl SideRule {
     /// The name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Automatic => "auto",
             Self::Outward => "outward",
             Self::TowardScanner => "toward-scanner",
             Self::Up => "up",
@@ -50,6 +54,7 @@ impl SideRule {
     /// The name in menus.
     pub fn label(self) -> &'static str {
         match self {
+            Self::Automatic => "Automatic",
             Self::Outward => "Outward",
             Self::TowardScanner => "Toward the scanner",
             Self::Up => "Up",
@@ -58,12 +63,12 @@ impl SideRule {
         }
     }
 
-    /// The rules that are tried for a component in turn, this one first: where it has nothing to go by, what is seen from
-    /// outside is the next best.
+    /// The rules that are tried for a component in turn, this one or what it stands for first: where it has nothing to go by,
+    /// what is seen from outside is the next best.
     pub fn with_fallback(self) -> &'static [Self] {
         match self {
             Self::Outward => &[Self::Outward],
-            Self::TowardScanner => &[Self::TowardScanner, Self::Outward],
+            Self::Automatic | Self::TowardScanner => &[Self::TowardScanner, Self::Outward],
             Self::Up => &[Self::Up, Self::Outward],
             Self::IntoRoom => &[Self::IntoRoom],
             Self::Given => &[Self::Given, Self::Outward],
@@ -118,7 +123,7 @@ impl<'a> Clues<'a> {
             cloud, normals, radii, ..
         } = *self;
         match rule {
-            SideRule::TowardScanner if self.scanner.is_none() && !known.stations.is_empty() => {
+            SideRule::Automatic | SideRule::TowardScanner if self.scanner.is_none() && !known.stations.is_empty() => {
                 self.scanner = Some(evidence::scanner(cloud, normals, known.stations));
             }
             SideRule::Given if self.given.is_none() => {
@@ -186,6 +191,8 @@ pub fn decide_side(points: &[u32], turned: impl Fn(u32) -> bool + Sync, rule: Si
     for &rule in rule.with_fallback() {
         let tally = match rule {
             SideRule::Outward => votes(&clues.outside),
+            // Stands for others, so it is none of those that are tried.
+            SideRule::Automatic => Tally::default(),
             SideRule::TowardScanner => votes(&clues.scanner),
             SideRule::Given => votes(&clues.given),
             SideRule::Up => upward(points, &turned, clues),

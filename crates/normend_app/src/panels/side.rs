@@ -222,6 +222,7 @@ fn side_row(ui: &mut Ui, draft: &mut Parameters, has_normals: bool) {
 
 fn side_meaning(rule: SideRule) -> &'static str {
     match rule {
+        SideRule::Automatic => "Toward the scanner where all was seen from one place, else out of the thing",
         SideRule::Outward => "Out of the thing: objects",
         SideRule::TowardScanner => "Toward the place that a point was scanned from",
         SideRule::Up => "Up along z: terrain",

@@ -416,6 +416,7 @@ mod tests {
             patches: Some(Arc::new(Patches::new(&tree, &levels))),
             tree,
             evidence: None,
+            found_station: None,
             seconds: Vec::new(),
         });
         document

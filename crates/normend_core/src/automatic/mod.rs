@@ -91,6 +91,13 @@ pub(crate) fn gather_evidence(
     known: &Known<'_>,
     progress: &dyn Progress,
 ) -> Result<Evidence, Cancelled> {
+    // From one place one side of each surface is seen; lines and views from elsewhere meet others and would contradict.
+    if let [station] = known.stations
+        && station.points.start == 0
+        && station.points.end as usize >= cloud.n_points()
+    {
+        return Ok(evidence::scanner(cloud, normals, known.stations));
+    }
     let n_axes = evidence::crossing_axes(cloud.n_points());
     let mut evidence = evidence::crossings(cloud, neighbors, radii, normals, n_axes, &Part::new(progress, 0.0..0.5))?;
     if cloud.n_points() <= FEW_POINTS || evidence.share_known() < MOSTLY_KNOWN {

@@ -35,6 +35,7 @@ fn propagation(turned: [bool; 8]) -> Propagation {
         sides: Vec::new(),
         patches: Some(Arc::new(Patches::new(&world.tree, &levels))),
         evidence: None,
+        found_station: None,
         seconds: Vec::new(),
     }
 }

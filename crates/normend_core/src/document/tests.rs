@@ -55,6 +55,7 @@ fn propagation_of(world: &World, normals: &[Vec3]) -> Propagation {
         patches: None,
         voted_sources: Arc::default(),
         evidence: None,
+        found_station: None,
         seconds: Vec::new(),
     }
 }

@@ -40,6 +40,7 @@ fn propagation(world: &World, voted: &Signs) -> Propagation {
         sides: Vec::new(),
         patches: None,
         evidence: None,
+        found_station: None,
         seconds: Vec::new(),
     }
 }

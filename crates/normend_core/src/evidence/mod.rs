@@ -16,6 +16,7 @@ mod inside_views;
 mod outside_views;
 mod scanner;
 mod scene;
+mod station_search;
 
 use fixedbitset::FixedBitSet;
 use glam::Vec3;
@@ -27,6 +28,7 @@ pub use inside_places::inside_places;
 pub use inside_views::inside_views;
 pub use outside_views::{N_VIEWS, outside_views};
 pub use scanner::{Station, scanner};
+pub use station_search::{FoundStation, find_station};
 
 /// A vote of one: what a single look at a point from straight above weighs. 1/4096 is finer than any weight is known, and
 /// the sum over the points of the largest cloud stays within `i64`.
