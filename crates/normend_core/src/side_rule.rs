@@ -1,7 +1,7 @@
 //! Which of its two sides a connected component shows: one sign for all of its points, by a rule and by evidence.
 //!
 //! Signs within a component come from elsewhere; here only the whole is turned or not. A rule that has nothing to go by gives
-//! way to the next: see [`SideRule::fallbacks`]. Sums are of whole numbers, so they do not depend on the order of points.
+//! way to the next: see [`SideRule::with_fallback`]. Sums are of whole numbers, so they do not depend on the order of points.
 
 use glam::{I64Vec3, Vec3};
 use rayon::prelude::*;

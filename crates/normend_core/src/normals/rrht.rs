@@ -18,7 +18,7 @@ use crate::{Cancelled, Neighbors, PointCloud, Progress};
 ///
 /// Triples are of ranks by distance and the same for each point, so the result depends neither on the order of points, ties
 /// aside, nor on the number of threads. Turning the cloud draws other votes, so normals turn with it only nearly. A neighborhood
-/// without a plane has the normal of [`pca`](super::pca()). O(n) draws of a triple, at most [`ROTATIONS`] × [`TRIPLES`] a point and
+/// without a plane has the normal of [`pca`](super::pca()). O(n) draws of a triple, at most `ROTATIONS` × `TRIPLES` a point and
 /// some ten times fewer where points are on a plane; parallel over points.
 ///
 /// # Errors
