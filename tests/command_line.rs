@@ -232,8 +232,8 @@ fn the_report_has_every_field() {
     assert_eq!(
         report["parameters"],
         serde_json::json!({
-            "estimator": "wpca", "k_normals": 9, "k_graph": 7, "edge_rule": "dot", "start": "estimate",
-            "sources": "highest", "views": 8, "eta": 0.07, "rule": "outward"
+            "method": "spanning-tree", "estimator": "wpca", "k_normals": 9, "k_graph": 7, "edge_rule": "dot", "start": "estimate",
+            "sources": "highest", "views": 8, "eta": 0.07, "rule": normend_core::SideRule::default().name()
         })
     );
     let seconds = report["seconds"].as_object().unwrap();
@@ -340,6 +340,39 @@ fn orient_turns_a_ball_to_the_side_that_is_asked_for() {
     check("ball.ply", "--sensors places.tsv --rule outward", 0);
     check("inward.ply", "--rule given", 3000);
     check("ball.ply", "--rule given", 0);
+}
+
+#[test]
+fn orient_finds_where_a_room_was_scanned_from() {
+    let folder = folder();
+    let clouds = normend_core::shapes::benchmark_clouds();
+    let room = clouds
+        .iter()
+        .find(|cloud| cloud.name == "room_office_1_station")
+        .unwrap();
+    let room = room.generate(&Silent).unwrap();
+    let points: Vec<(Vec3, Vec3)> = room.shape.positions.into_iter().zip(room.shape.normals).collect();
+    fs::write(folder.path().join("room.ply"), ply_of(&points)).unwrap();
+    let orient = |flags: &str| {
+        let oriented = run(
+            &folder,
+            &format!("orient room.ply -o out.ply --overwrite -q --json - {flags}"),
+        );
+        (oriented.expect(0).json(), n_wrong(&folder, "out.ply", "room.ply"))
+    };
+    let (report, wrong) = orient("");
+    assert_eq!(report["rule"], "Toward the scanner");
+    let found: Vec<f64> = serde_json::from_value(report["found_station"].clone()).unwrap();
+    let truth = room.stations[0].position;
+    let off = truth.distance(glam::DVec3::from_slice(&found));
+    assert!(off < 0.15, "{off}");
+    assert!(wrong < points.len() as u64 / 20, "{wrong}");
+    let (report, wrong) = orient("--rule outward");
+    assert_eq!(
+        (&report["rule"], &report["found_station"]),
+        (&Value::from("Outward"), &Value::Null)
+    );
+    assert!(wrong > points.len() as u64 / 2, "{wrong}");
 }
 
 #[test]

@@ -167,8 +167,8 @@ pub struct PropagationArguments {
     #[arg(long, value_name = "X", value_parser = eta)]
     pub eta: Option<f32>,
 
-    /// Which side is the right one: outside of objects, the scanner's, the upper one, inside of rooms, that of given normals
-    /// [default: outward, or toward-scanner where its place is given]
+    /// Which side is the right one: what the points tell (auto), outside of objects, the scanner's, the upper one, inside of rooms, that of given normals
+    /// [default: auto, or toward-scanner where its place is given]
     #[arg(long, value_name = "NAME", value_parser = one_of(&SideRule::ALL, SideRule::name))]
     pub rule: Option<SideRule>,
 }
@@ -267,11 +267,13 @@ The output's extension says its format; without one, or with the input's, it is 
 The report (--json) has a line for each input: an object with input, output, points, left_out (rows without finite \
 coordinates), components, sources (places where signs start), voted_sources (those found by visibility), \
 without_evidence (components that no evidence tells the side of), undecided (points whose sign is no more than a guess; null \
-where the method does not know), parameters, seconds (read, neighbors, normals, \
+where the method does not know), rule (what decided the sides, in words), found_station ([x, y, z] where all was scanned from, \
+if --rule auto found it, else null), parameters, seconds (read, neighbors, normals, \
 sources where voted, graph, tree, signs, write, total) and peak_rss_bytes (of the program so far; null where the system \
 does not tell). A failed input has input and error.
 
-The right side of each component (--rule) is decided by what is seen of it from outside (outward), by the scanner's place \
+The right side of each component (--rule) is decided by the scanner's place where all was scanned from one place and that is \
+found, and else as by outward (auto); by what is seen of it from outside (outward), by the scanner's place \
 (toward-scanner), by +z (up), by what is seen from within (into-room), or by the file's normals (given); where that says \
 nothing, by what is seen from outside.
 

@@ -464,6 +464,7 @@ impl App {
             cloud,
         } = propagation;
         let secs: f64 = propagation.seconds.iter().map(|(_, secs)| secs).sum();
+        let is_from_one_place = propagation.found_station.is_some();
         session.install(propagation);
         if let Some(scene) = &mut self.scene {
             self.mend.reset(scene);
@@ -483,6 +484,9 @@ impl App {
                 ),
                 (Start::Estimate, _) => format!("Oriented {n_points} in {time:.1} s."),
             });
+        if is_from_one_place {
+            self.messages.note("Scanned from one place: normals face it.");
+        }
         let n_undecided = session.n_undecided();
         if n_undecided > 0 {
             self.messages.note(format!(

@@ -57,6 +57,10 @@ struct Oriented {
     without_evidence: usize,
     /// Null where the method does not know.
     undecided: Option<usize>,
+    /// What decided the sides, in words.
+    rule: &'static str,
+    /// Where all was scanned from, if that was found.
+    found_station: Option<[f64; 3]>,
     #[serde(serialize_with = "serialize_parameters")]
     parameters: Parameters,
     seconds: Seconds,
@@ -78,6 +82,7 @@ pub(super) fn serialize_parameters<S: Serializer>(parameters: &Parameters, seria
     /// The parameters under the names of their flags.
     #[derive(Serialize)]
     struct Named {
+        method: &'static str,
         estimator: &'static str,
         k_normals: usize,
         k_graph: usize,
@@ -89,6 +94,7 @@ pub(super) fn serialize_parameters<S: Serializer>(parameters: &Parameters, seria
         rule: &'static str,
     }
     let named = Named {
+        method: parameters.method.name(),
         estimator: parameters.estimator.name(),
         k_normals: parameters.k_normals,
         k_graph: parameters.k_graph,
@@ -300,6 +306,7 @@ fn orient(job: &Job, parameters: Parameters, arguments: &OrientArguments, bar: &
     let signs_started = Instant::now();
     let sureness = confidence(&propagation);
     let rule = propagation.rule();
+    let found_station = propagation.found_station.map(|found| found.position.to_array());
     let mut document = Document::new(scan.cloud.clone(), scan.given_normals.clone());
     document.install(propagation);
     let normals = document.oriented_normals().ok_or(EditError::NotReady)?;
@@ -328,6 +335,8 @@ fn orient(job: &Job, parameters: Parameters, arguments: &OrientArguments, bar: &
         voted_sources,
         without_evidence,
         undecided: sureness.as_deref().map(n_undecided),
+        rule,
+        found_station,
         parameters,
         seconds,
         peak_rss_bytes: peak_rss_bytes(),

@@ -452,3 +452,97 @@ fn nearest(tree: &Tree, place: &[f32; 3]) -> impl Iterator<Item = (usize, f32)> 
         .into_iter()
         .map(|result| (result.item as usize, result.distance))
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DMat3, dvec3};
+
+    use super::*;
+    use crate::shapes::{self, Shape, benchmark_clouds};
+    use crate::{Estimator, Silent, normals};
+
+    fn find(positions: Vec<Vec3>) -> Option<FoundStation> {
+        let cloud = PointCloud::new(DVec3::ZERO, positions).unwrap();
+        let neighbors = Neighbors::find(&cloud, SPACING_NEIGHBOR, &Silent).unwrap();
+        let normals = normals::estimate(&cloud, &neighbors, 12, Estimator::Pca, &Silent).unwrap();
+        find_station(&cloud, &neighbors, &normals, &Silent).unwrap()
+    }
+
+    fn benchmark(name: &str) -> Shape {
+        let clouds = benchmark_clouds();
+        let cloud = clouds.iter().find(|cloud| cloud.name == name).unwrap();
+        cloud.generate(&Silent).unwrap().shape
+    }
+
+    /// Where the benchmark's scanner stands.
+    const OFFICE_STATION: DVec3 = dvec3(-0.35, -0.3, -0.05);
+
+    #[test]
+    fn the_place_in_a_room_is_found_however_it_lies() {
+        let office = benchmark("room_office_1_station").positions;
+        for (turn, scale) in [(0.0, 1.0), (0.0, 1024.0), (1.0, 0.3), (4.0, 7.0)] {
+            let rotation = DMat3::from_rotation_z(turn) * DMat3::from_rotation_x(0.5 * turn);
+            let place = |position: DVec3| scale * (rotation * position);
+            let found = find(office.iter().map(|p| place(p.as_dvec3()).as_vec3()).collect()).unwrap();
+            let off = found.position.distance(place(OFFICE_STATION)) / scale;
+            assert!(off < 0.15, "turned by {turn}, scaled by {scale}: off by {off}");
+        }
+    }
+
+    #[test]
+    fn the_order_of_points_and_the_number_of_threads_do_not_matter() {
+        let mut positions = benchmark("room_office_1_station").positions;
+        let found = find(positions.clone());
+        positions.reverse();
+        assert_eq!(find(positions.clone()), found);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        assert_eq!(pool.install(|| find(positions)), found);
+    }
+
+    #[test]
+    fn things_were_not_scanned_from_one_place() {
+        let mut shapes: Vec<(&str, Shape)> = vec![
+            ("sphere", shapes::sphere(8000)),
+            ("torus", shapes::torus(8000)),
+            ("fandisk", shapes::fandisk_like(8000)),
+            ("few points", shapes::sphere(SAMPLE - 1)),
+        ];
+        let names = [
+            "bracket_clusters",
+            "animal_falloff",
+            "figure_gradient",
+            "torus_falloff",
+            "figure_front_back",
+            "bowl",
+            "hills",
+            "half_sphere",
+        ];
+        shapes.extend(names.map(|name| (name, benchmark(name))));
+        for (name, shape) in shapes {
+            assert_eq!(find(shape.positions), None, "{name}");
+        }
+    }
+
+    /// Points where even rays from the origin meet the body of a bumpy ball; `hole` leaves out those below.
+    fn bumpy_ball(hole: bool) -> Vec<Vec3> {
+        let directions = shapes::sphere(20_000).positions;
+        let radius = |d: Vec3| 1.0 + 0.35 * (5.0 * d.x).sin() * (4.0 * d.y + 1.0).cos();
+        let kept = directions.into_iter().filter(|d| !hole || d.z > -0.8);
+        kept.map(|d| radius(d) * d).collect()
+    }
+
+    #[test]
+    fn a_body_made_by_rays_from_within_is_no_room() {
+        assert!(find(bumpy_ball(true)).is_some());
+        assert_eq!(find(bumpy_ball(false)), None);
+    }
+
+    #[test]
+    fn clouds_without_extent_have_no_place() {
+        for positions in [vec![Vec3::ONE; 5000], Vec::new()] {
+            assert_eq!(find(positions), None);
+        }
+        let line = (0..5000).map(|i| Vec3::X * i as f32).collect();
+        assert_eq!(find(line), None);
+    }
+}
