@@ -462,7 +462,8 @@ mod tests {
     fn estimators_come_first() {
         for (index, method) in METHODS.iter().enumerate() {
             let parameters = (method.parameters)();
-            let one_source = parameters.sources == SourceRule::Highest && parameters.method == normend_core::Method::SpanningTree;
+            let one_source =
+                parameters.sources == SourceRule::Highest && parameters.method == normend_core::Method::SpanningTree;
             assert_eq!(index < N_ESTIMATORS, one_source);
         }
     }
