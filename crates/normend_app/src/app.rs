@@ -268,7 +268,13 @@ impl App {
             }
         });
         Panel::bottom("status").frame(frame).show(ui, |ui| {
-            status_bar::ui(ui, self.session.as_ref(), self.mend.n_would_turn(), self.mend.level(), &self.adapter);
+            status_bar::ui(
+                ui,
+                self.session.as_ref(),
+                self.mend.n_would_turn(),
+                self.mend.level(),
+                &self.adapter,
+            );
         });
         action
     }
