@@ -338,7 +338,8 @@ impl Propagation {
         });
         let known = &Known {
             stations: station.as_ref().map_or(known.stations, slice::from_ref),
-            ..*known
+            // The file's normals are asked only where the user trusts them.
+            given: known.given.filter(|_| parameters.rule == SideRule::Given),
         };
         let part = Part::new(progress, 0.45..0.65);
         let evidence = automatic::gather_evidence(cloud, &neighbors, &splat_radii, &unoriented.normals, known, &part)?;

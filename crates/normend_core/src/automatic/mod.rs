@@ -79,7 +79,8 @@ pub(crate) struct Unoriented {
 }
 
 /// Gathers what is known of the sides of `normals`: sheets counted along lines, scanner places, and views from outside where
-/// the lines say little, as of open surfaces.
+/// the lines say little, as of open surfaces. Given normals in `known` are trusted: where most points have one, nothing else
+/// is asked.
 ///
 /// # Errors
 /// [`Cancelled`] when `progress` asks to stop; nothing else.
@@ -98,6 +99,10 @@ pub(crate) fn gather_evidence(
     {
         return Ok(evidence::scanner(cloud, normals, known.stations));
     }
+    let given = known.given.map(|given| evidence::given(normals, given, 1.0));
+    if let Some(given) = given.as_ref().filter(|given| given.share_known() >= MOSTLY_KNOWN) {
+        return Ok(given.clone());
+    }
     let n_axes = evidence::crossing_axes(cloud.n_points());
     let mut evidence = evidence::crossings(cloud, neighbors, radii, normals, n_axes, &Part::new(progress, 0.0..0.5))?;
     if cloud.n_points() <= FEW_POINTS || evidence.share_known() < MOSTLY_KNOWN {
@@ -106,6 +111,9 @@ pub(crate) fn gather_evidence(
     }
     if !known.stations.is_empty() {
         evidence.add(&evidence::scanner(cloud, normals, known.stations));
+    }
+    if let Some(given) = given {
+        evidence.add(&given);
     }
     Ok(evidence)
 }

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::evidence::UNIT;
 use crate::shapes::{self, Shape};
-use crate::{Parameters, Propagation, Silent};
+use crate::{Parameters, Propagation, SideRule, Silent};
 
 /// The oriented normals that the automatic method gives.
 fn oriented(positions: &[Vec3]) -> Vec<Vec3> {
@@ -54,6 +54,25 @@ fn hidden_sheets_come_out_right() {
         shape.normals.extend(shell.normals.iter().map(|normal| sign * normal));
     }
     assert_eq!(n_wrong(&shape), 0);
+}
+
+#[test]
+fn given_normals_are_believed_where_they_are_trusted() {
+    // All normals are given inward.
+    for (shape, most_wrong) in [(shapes::sphere(3000), 0), (shapes::thin_plate(4000, 0.02), 20)] {
+        let cloud = PointCloud::new(DVec3::ZERO, shape.positions.clone()).unwrap();
+        let inward: Vec<Vec3> = shape.normals.iter().map(|normal| -normal).collect();
+        for (rule, right) in [(SideRule::Given, &inward), (SideRule::Outward, &shape.normals)] {
+            let parameters = Parameters {
+                rule,
+                ..Parameters::default()
+            };
+            let propagation = Propagation::new(&cloud, Some(&inward[..]), parameters, &Silent).unwrap();
+            let normals = propagation.initial_normals();
+            let n_wrong = normals.iter().zip(right).filter(|(a, b)| a.dot(**b) < 0.0).count();
+            assert!(n_wrong <= most_wrong, "{n_wrong} are wrong by {rule:?}");
+        }
+    }
 }
 
 #[test]
