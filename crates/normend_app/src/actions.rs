@@ -63,7 +63,7 @@ impl App {
                 let propagation = document.and_then(Document::propagation);
                 check(
                     propagation.is_some_and(|propagation| propagation.patches.is_some()),
-                    "the scan was oriented without patches",
+                    "there are no patches: choose Estimate and the preset Automatic, then Propagate",
                 )
             }
             Command::SelectAllSources => check(

@@ -49,8 +49,9 @@ const CALIBRATION: [(f32, f32); 11] = [
 /// was inside out; below are open sheets, whose side is a matter of convention, and rooms.
 const SURE_AGREEMENT: f32 = 0.5;
 
-/// Confidence of a point that is as likely wrong as right, or less, in units of 1/255; the sign of such a point is undecided.
-pub const UNDECIDED: u8 = 127;
+/// Confidence of a point that is as likely wrong as right, or less, in units of 1/255, where a half rounds up; the sign of such a
+/// point is undecided.
+pub const UNDECIDED: u8 = 128;
 
 /// Confidence by point, in units of 1/255, that the sign which `propagation` starts with is right, the side of its component
 /// included; see [`of_points`] and [`of_side`]. `None` where the method leaves no patches and evidence behind: it is known for
@@ -185,6 +186,7 @@ mod tests {
         }
         let confidence = confidence(&propagation).unwrap();
         assert!(confidence.iter().all(|&c| (127..=128).contains(&c)), "{confidence:?}");
+        assert_eq!(n_undecided(&confidence), confidence.len());
         let check = |rule: Option<SideRule>, agreement: f32, expect: f32| {
             let side = Side {
                 turned: false,

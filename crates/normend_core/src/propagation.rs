@@ -266,8 +266,7 @@ impl Propagation {
             initially_turned.set(root as usize, turned);
         }
         let mut decided = Vec::new();
-        let asks_sources =
-            parameters.rule == SideRule::Automatic && known.stations.is_empty() || parameters.rule == SideRule::Outward;
+        let asks_sources = parameters.rule == SideRule::Automatic && known.stations.is_empty();
         if given.is_none() && !asks_sources {
             progress.stage("Looking for the right side");
             let mut clues = Clues::new(cloud, &normals, &splat_radii);
@@ -352,11 +351,15 @@ impl Propagation {
 
         progress.stage("Looking for the right side");
         let mut clues = Clues::new(cloud, &found.normals, &splat_radii);
-        clues.outside = Some(found.evidence.clone());
+        // What the scanner saw, or the file says, is not what is seen from outside.
+        let is_outside = |origin: &Origin| matches!(origin, Origin::Crossings | Origin::OutsideViews);
+        if found.evidence.origins().iter().any(is_outside) {
+            clues.outside = Some(found.evidence.clone());
+        }
         clues.gather(parameters.rule, known, &Part::new(progress, 0.95..0.97))?;
         let mut decided = sides(&found.tree, parameters.rule, &clues);
         let is_open = decided.iter().any(|side| side.rule.is_none());
-        if is_open && !found.evidence.origins().contains(&Origin::OutsideViews) {
+        if is_open && found.evidence.origins() == [Origin::Crossings] {
             // What lines say nothing of may be seen all the same.
             let mut clues = Clues::new(cloud, &found.normals, &splat_radii);
             clues.gather(parameters.rule, known, &Part::new(progress, 0.97..1.0))?;

@@ -43,12 +43,12 @@ fn confidence_stands_after_the_normal() {
         "a.ply",
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\n\
          property float ny\nproperty float nz\nproperty float confidence\nproperty uchar oriented\nproperty int id\n\
-         end_header\n0 0 1 0 0 1 1 1 7\n1 0 1 0 0 1 0.5019608 1 8\n0 1 1 0 0 1 0.49803922 0 9\n",
+         end_header\n0 0 1 0 0 1 1 1 7\n1 0 1 0 0 1 0.5019608 0 8\n0 1 1 0 0 1 0.49803922 0 9\n",
     );
     check(
         "x,y,z,id\n0,0,1,7\n1,0,1,8\n",
         "a.csv",
-        "x,y,z,nx,ny,nz,confidence,oriented,id\n0,0,1,0,0,1,1,1,7\n1,0,1,0,0,1,0.5019608,1,8\n",
+        "x,y,z,nx,ny,nz,confidence,oriented,id\n0,0,1,0,0,1,1,1,7\n1,0,1,0,0,1,0.5019608,0,8\n",
     );
 }
 
@@ -61,7 +61,7 @@ fn confidence_takes_the_place_of_what_is_there() {
         "a.ply",
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float confidence\nproperty float nx\nproperty float ny\n\
          property float nz\nproperty uchar oriented\nproperty int id\nproperty float x\nproperty float y\nproperty float z\n\
-         end_header\n1 0 0 1 1 7 0 0 1\n0.5019608 0 0 1 1 8 1 0 1\n0.75 0 0 -1 0 9 0 1 nan\n",
+         end_header\n1 0 0 1 1 7 0 0 1\n0.5019608 0 0 1 0 8 1 0 1\n0.75 0 0 -1 0 9 0 1 nan\n",
     );
 }
 

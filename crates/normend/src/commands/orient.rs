@@ -10,7 +10,7 @@ use anyhow::Context;
 use normend_core::confidence::{confidence, n_undecided};
 use normend_core::evidence::Known;
 use normend_core::progress::Part;
-use normend_core::{Document, EditError, Method, Parameters, Progress, Propagation, SideRule, Start};
+use normend_core::{Document, EditError, Method, Parameters, Progress, Propagation, SideRule, SourceRule, Start};
 use normend_io::WriteOptions;
 use serde::{Serialize, Serializer};
 
@@ -176,7 +176,19 @@ fn plan(arguments: &OrientArguments) -> anyhow::Result<Plan> {
             "the rule toward-scanner needs the scanner's place: give --scanner X,Y,Z or --sensors TSV",
         ));
     }
-    let Parameters { method, start, .. } = arguments.propagation.into();
+    let Parameters {
+        method,
+        start,
+        sources,
+        rule,
+        ..
+    } = arguments.propagation.into();
+    let by_votes = method == Method::SpanningTree && sources != SourceRule::Highest;
+    if by_votes && !matches!(rule, SideRule::Automatic | SideRule::Outward) {
+        return Err(wrong_use(
+            "voted sources show what is seen from outside: another --rule needs the preset auto or tree",
+        ));
+    }
     if arguments.confidence && (method != Method::Agglomeration || start == Start::Keep) {
         return Err(wrong_use(
             "--confidence is known for the automatic method only: leave out the flags of other methods and --start keep",

@@ -54,6 +54,11 @@ pub fn run(arguments: &SuspectsArguments) -> anyhow::Result<Outcome> {
             "the rule toward-scanner needs the scanner's place: give --scanner X,Y,Z or --sensors TSV",
         ));
     }
+    if arguments.rule == Some(SideRule::Given) {
+        return Err(wrong_use(
+            "the rule given would judge the file's normals by themselves: choose another rule",
+        ));
+    }
     let json = arguments.json.as_deref();
     if json.is_some_and(|report| is_same_file(report, &arguments.input)) {
         return Err(wrong_use(

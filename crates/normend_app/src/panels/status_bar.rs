@@ -41,7 +41,7 @@ pub fn ui(
                 ui.label(RichText::new("·").weak());
                 let mut text = format!("A click turns {}", theme::counted(n_points, "point", "points"));
                 if let Some((level, n_levels)) = level {
-                    text += &format!(" (patch size {level} of {n_levels})");
+                    text += &format!(" (patch size {level} of {n_levels}, [ and ] change it)");
                 }
                 ui.label(RichText::new(text).color(theme::accent(ui)));
             }

@@ -14,7 +14,7 @@ impl Tool {
     /// How it is used, in one line.
     pub fn hint(self) -> &'static str {
         match self {
-            Self::Mend => "Mend: point at a wrong region, click to turn what is highlighted; [ and ] change its size",
+            Self::Mend => "Mend: point at a wrong region, click to turn what is highlighted",
         }
     }
 }
