@@ -471,7 +471,7 @@ fn the_sheet_lists_every_command() {
     let Some(mut editor) = start(|_| None) else { return };
     editor.key(Modifiers::NONE, Key::F1);
     editor.harness.run_steps(3);
-    for command in Command::ALL {
+    for &command in Command::ALL {
         let label = command.label();
         assert!(editor.harness.query_all_by_label(label).next().is_some(), "{label}");
     }

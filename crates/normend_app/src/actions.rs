@@ -73,7 +73,13 @@ impl App {
             Command::FlipSources | Command::RemoveSources => check(n_selected > 0, "no source is selected"),
             Command::FrameAll
             | Command::SetPivot
-            | Command::View(_)
+            | Command::ViewFront
+            | Command::ViewBack
+            | Command::ViewRight
+            | Command::ViewLeft
+            | Command::ViewTop
+            | Command::ViewBottom
+            | Command::ViewCorner
             | Command::ToggleOrthographic
             | Command::ZoomIn
             | Command::ZoomOut
@@ -190,7 +196,17 @@ impl App {
                     self.viewport.frame_all(session.document.cloud());
                 }
             }
-            Command::View(view) => self.viewport.camera.set_view(view),
+            Command::ViewFront
+            | Command::ViewBack
+            | Command::ViewRight
+            | Command::ViewLeft
+            | Command::ViewTop
+            | Command::ViewBottom
+            | Command::ViewCorner => {
+                if let Some(view) = command.standard_view() {
+                    self.viewport.camera.set_view(view);
+                }
+            }
             Command::ToggleOrthographic => self.viewport.toggle_orthographic(),
             Command::ZoomIn => self.viewport.zoom(ZOOM_STEP),
             Command::ZoomOut => self.viewport.zoom(1.0 / ZOOM_STEP),

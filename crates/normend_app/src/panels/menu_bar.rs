@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use egui::{Button, RichText, Ui};
 
 use super::Availability;
-use crate::command::{Action, Command, Menu, shortcut_text};
+use crate::command::{Action, Command, Menu};
 use crate::theme::{self, SPACE_S, SPACE_XS};
 use crate::tools::Tool;
 
@@ -17,7 +17,7 @@ pub fn menus(ui: &mut Ui, availability: &Availability<'_>, recent: &[PathBuf]) -
             ui.menu_button(menu.label(), |ui| {
                 ui.set_min_width(232.0);
                 let mut group = None;
-                for command in Command::ALL.into_iter().filter(|command| command.menu() == menu) {
+                for command in menu.commands() {
                     if group.is_some_and(|group| group != command.group()) {
                         ui.separator();
                     }
@@ -40,8 +40,8 @@ pub fn menus(ui: &mut Ui, availability: &Availability<'_>, recent: &[PathBuf]) -
 fn item(ui: &mut Ui, command: Command, availability: &Availability<'_>) -> bool {
     let available = availability(command);
     let mut button = Button::new(command.label());
-    if let Some(shortcut) = command.keys().first() {
-        button = button.shortcut_text(shortcut_text(ui.ctx(), shortcut));
+    if let Some(keys) = command.key_text(ui.ctx()) {
+        button = button.shortcut_text(keys);
     }
     let response = ui.add_enabled(available.is_ok(), button);
     match available {

@@ -2,7 +2,7 @@
 
 use egui::{Align2, RichText, ScrollArea, Ui, Vec2};
 
-use crate::command::{Command, MOUSE, Menu};
+use crate::command::{MOUSE, Menu};
 use crate::theme::{self, SPACE_L, SPACE_XS};
 
 /// Width of what is done and of the keys, so that they align from section to section.
@@ -39,7 +39,7 @@ pub fn ui(ui: &Ui, open: &mut bool) {
                         ui.spacing_mut().item_spacing.x = 2.0 * SPACE_L;
                         ui.vertical(|ui| {
                             mouse(ui);
-                            for menu in [Menu::File, Menu::Edit] {
+                            for menu in [Menu::File, Menu::Edit, Menu::Select, Menu::Mend] {
                                 keys(ui, menu);
                             }
                         });
@@ -61,11 +61,11 @@ fn mouse(ui: &mut Ui) {
 fn keys(ui: &mut Ui, menu: Menu) {
     let ctx = ui.ctx().clone();
     theme::section(ui, menu.label(), |ui| {
-        let commands = Command::ALL.into_iter().filter(|command| command.menu() == menu);
         sheet(
             ui,
             menu.label(),
-            commands.map(|command| (command.label(), command.keys_text(&ctx))),
+            menu.commands()
+                .map(|command| (command.label(), command.keys_text(&ctx))),
         );
     });
 }

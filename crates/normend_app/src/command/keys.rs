@@ -1,0 +1,231 @@
+//! Which keys give which command: the defaults of the table, and what the user made of them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use egui::{Id, Key, KeyboardShortcut, ModifierNames, Modifiers};
+
+use super::Command;
+
+/// The keys of all commands. Only what differs from the table is kept.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Keymap {
+    changed: BTreeMap<Command, Vec<KeyboardShortcut>>,
+}
+
+impl Keymap {
+    /// Makes these the keys that [`Command::keys`] and everything that shows keys in `ctx` use.
+    pub fn install(self, ctx: &egui::Context) {
+        ctx.data_mut(|data| data.insert_temp(Id::NULL, Arc::new(self)));
+    }
+
+    /// The keys in force; those of the table before [`Self::install`].
+    pub fn of(ctx: &egui::Context) -> Arc<Self> {
+        ctx.data(|data| data.get_temp(Id::NULL)).unwrap_or_default()
+    }
+
+    /// The keys of a command, the usual one first.
+    pub fn keys(&self, command: Command) -> &[KeyboardShortcut] {
+        self.changed.get(&command).map_or(command.row().keys, Vec::as_slice)
+    }
+
+    /// The command that a key gives.
+    pub fn owner(&self, shortcut: KeyboardShortcut) -> Option<Command> {
+        Command::ALL
+            .iter()
+            .copied()
+            .find(|&command| self.keys(command).contains(&shortcut))
+    }
+}
+
+impl Command {
+    /// The keys of the table, which the user may have changed.
+    pub fn default_keys(self) -> &'static [KeyboardShortcut] {
+        self.row().keys
+    }
+
+    /// The user's keys in words ("Ctrl+Shift+Z or Ctrl+Y"); empty without keys.
+    pub fn keys_text(self, ctx: &egui::Context) -> String {
+        let keymap = Keymap::of(ctx);
+        let keys: Vec<_> = keymap
+            .keys(self)
+            .iter()
+            .map(|shortcut| shortcut_text(ctx, shortcut))
+            .collect();
+        keys.join(" or ")
+    }
+
+    /// The first of the user's keys in words; `None` without keys.
+    pub fn key_text(self, ctx: &egui::Context) -> Option<String> {
+        let keymap = Keymap::of(ctx);
+        keymap.keys(self).first().map(|shortcut| shortcut_text(ctx, shortcut))
+    }
+
+    /// What it does with its key: "Take the last edit back (Ctrl+Z)".
+    pub fn tooltip_with_keys(self, ctx: &egui::Context) -> String {
+        let keys = self.keys_text(ctx);
+        if keys.is_empty() {
+            self.tooltip().to_owned()
+        } else {
+            format!("{} ({keys})", self.tooltip())
+        }
+    }
+}
+
+/// One shortcut as it is written on the keys ("Ctrl+Shift+Z", "+").
+pub fn shortcut_text(ctx: &egui::Context, shortcut: &KeyboardShortcut) -> String {
+    let is_mac = ctx.os().is_mac();
+    let held = ModifierNames::NAMES.format(&shortcut.modifiers, is_mac);
+    let plus = if held.is_empty() { "" } else { "+" };
+    let key = match shortcut.logical_key {
+        Key::Plus => "+",
+        Key::Minus => "−",
+        Key::Equals => "=",
+        Key::OpenBracket => "[",
+        Key::CloseBracket => "]",
+        Key::Period => ".",
+        Key::Questionmark => "?",
+        Key::ArrowLeft => "Left arrow",
+        Key::ArrowRight => "Right arrow",
+        Key::ArrowUp => "Up arrow",
+        Key::ArrowDown => "Down arrow",
+        Key::PageUp => "Page up",
+        Key::PageDown => "Page down",
+        key => key.name(),
+    };
+    format!("{held}{plus}{key}")
+}
+
+/// What the mouse does in the 3D view, and how: the first part of the sheet of shortcuts.
+pub const MOUSE: [(&str, &str); 12] = [
+    ("Show what a click would turn", "Move over the scan"),
+    ("Mend here", "Click"),
+    ("Mend along the tree here", "Alt+click"),
+    ("Turn whole region here", "Ctrl+click"),
+    ("Larger or smaller patch", "Press, turn the wheel, release"),
+    ("Select a source (Shift adds)", "Click its sphere"),
+    ("Orbit", "Left drag"),
+    ("Pan", "Right, middle or Shift+left drag"),
+    ("Zoom to the pointer", "Wheel"),
+    ("Larger or smaller splats", "Alt+wheel"),
+    ("Turn around this point", "Double-click or middle click"),
+    ("Open a scan (not on Wayland)", "Drop its file"),
+];
+
+/// Takes the commands out of the keyboard input. With `typing`, a text field has the keyboard and gets all keys but
+/// Escape; plain keys are also left alone when a widget has the focus.
+pub fn take_shortcuts(ctx: &egui::Context, typing: bool, widget_focused: bool) -> Vec<Command> {
+    let keymap = Keymap::of(ctx);
+    let mut rows: Vec<_> = Command::ALL
+        .iter()
+        .flat_map(|&command| keymap.keys(command).iter().map(move |shortcut| (command, shortcut)))
+        .collect();
+    // A shortcut also matches with Shift held, so those that ask for more modifiers come first.
+    rows.sort_by_key(|(_, shortcut)| std::cmp::Reverse(n_modifiers(shortcut.modifiers)));
+    ctx.input_mut(|input| {
+        rows.into_iter()
+            .filter(|(command, shortcut)| {
+                let available = if typing {
+                    *command == Command::Cancel
+                } else {
+                    !widget_focused || n_modifiers(shortcut.modifiers) > 0 || *command == Command::Cancel
+                };
+                available && input.consume_shortcut(shortcut)
+            })
+            .map(|(command, _)| command)
+            .collect()
+    })
+}
+
+fn n_modifiers(modifiers: Modifiers) -> u32 {
+    u32::from(modifiers.shift) + u32::from(modifiers.alt) + u32::from(modifiers.command || modifiers.ctrl)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_commands_share_a_key() {
+        let mut keys: Vec<(KeyboardShortcut, Command)> = Vec::new();
+        for &command in Command::ALL {
+            for &shortcut in command.default_keys() {
+                if let Some((_, other)) = keys.iter().find(|(taken, _)| *taken == shortcut) {
+                    panic!("{command:?} and {other:?} share {shortcut:?}");
+                }
+                keys.push((shortcut, command));
+            }
+        }
+        assert!(keys.len() > 30);
+    }
+
+    #[test]
+    fn keys_are_named_as_they_are_written() {
+        let ctx = egui::Context::default();
+        let check = |command: Command, expect: &str| assert_eq!(command.keys_text(&ctx), expect);
+        check(Command::Open, "Ctrl+O");
+        check(Command::Redo, "Ctrl+Shift+Z or Ctrl+Y");
+        check(Command::SetPivot, ".");
+        check(Command::LargerSplats, "+ or =");
+        check(Command::SmallerSplats, "−");
+        check(Command::LargerPatch, "]");
+        check(Command::MendAlongTreeHere, "Alt+Enter");
+        check(Command::Shortcuts, "F1 or ?");
+        check(Command::OrbitLeft, "Left arrow");
+        check(Command::About, "");
+    }
+
+    #[test]
+    fn menu_and_mouse_call_the_same_thing_the_same() {
+        for command in [
+            Command::MendHere,
+            Command::MendAlongTreeHere,
+            Command::TurnWholeHere,
+            Command::SetPivot,
+        ] {
+            assert!(MOUSE.iter().any(|(what, _)| *what == command.label()), "{command:?}");
+        }
+    }
+
+    fn check(modifiers: Modifiers, key: Key, typing: bool, widget_focused: bool, expect: &[Command]) {
+        let ctx = egui::Context::default();
+        let input = egui::RawInput {
+            events: vec![egui::Event::Key {
+                key,
+                physical_key: None,
+                pressed: true,
+                repeat: false,
+                modifiers,
+            }],
+            ..Default::default()
+        };
+        let mut taken = Vec::new();
+        let mut output = ctx.run_ui(input, |ui| {
+            taken.extend(take_shortcuts(ui.ctx(), typing, widget_focused))
+        });
+        // Nothing is painted here.
+        output.textures_delta.clear();
+        assert_eq!(taken, expect, "{modifiers:?} {key:?}");
+    }
+
+    #[test]
+    fn keys_give_their_command() {
+        let ctrl = Modifiers::COMMAND | Modifiers::CTRL;
+        check(ctrl, Key::Z, false, false, &[Command::Undo]);
+        check(ctrl | Modifiers::SHIFT, Key::Z, false, false, &[Command::Redo]);
+        check(ctrl, Key::Y, false, false, &[Command::Redo]);
+        check(Modifiers::NONE, Key::Num1, false, false, &[Command::ViewFront]);
+        check(ctrl, Key::Num1, false, false, &[Command::ViewBack]);
+        check(Modifiers::SHIFT, Key::Questionmark, false, false, &[Command::Shortcuts]);
+    }
+
+    #[test]
+    fn text_fields_keep_their_keys() {
+        let ctrl = Modifiers::COMMAND | Modifiers::CTRL;
+        check(Modifiers::NONE, Key::F, true, true, &[]);
+        check(ctrl, Key::Z, true, true, &[]);
+        check(Modifiers::NONE, Key::Escape, true, true, &[Command::Cancel]);
+        check(Modifiers::NONE, Key::Enter, false, true, &[]);
+        check(ctrl, Key::O, false, true, &[Command::Open]);
+    }
+}
