@@ -1,15 +1,27 @@
-//! Orbit camera around a pivot: turntable with z up, perspective or orthographic.
+//! Camera that orbits a pivot, as a turntable or freely, or flies; perspective or orthographic.
+//!
+//! As a turntable it has an azimuth and an elevation in a world whose [`UpAxis`] stands upright. It holds a rotation instead of
+//! those two angles, so that it may also roll; what asks for a turntable takes the roll out.
 //!
 //! View space is right-handed and looks along −z: x to the right, y up, z ("back") toward the eye. Pixels count from
 //! the top left corner of the picture.
 
-use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
+mod directions;
+
+use std::f32::consts::FRAC_PI_2;
 
 use glam::camera::rh::proj::directx;
-use glam::{BVec3, Mat3, Mat4, Vec2, Vec3, Vec4};
+use glam::{BVec3, Mat3, Mat4, Quat, Vec2, Vec3, Vec4};
+
+pub use directions::{StandardView, UpAxis};
 
 /// Radians that the view turns per pixel of an orbiting drag.
 const RADIANS_PER_PIXEL: f32 = 0.006;
+/// Radius of the ball that a free orbit rolls, as a part of half the picture's shorter side: a drag through its middle turns
+/// about as far as the turntable does, one along the border rolls the picture.
+const BALL_RADIUS: f32 = 0.5;
+/// A camera whose right hand points up or down by less than this (sine) counts as level.
+const LEVEL: f32 = 1e-3;
 /// Room around a framed box, as a factor on the distance.
 const FRAME_MARGIN: f32 = 1.06;
 /// Vertical field of view of a new camera, in radians.
@@ -23,78 +35,6 @@ pub enum Projection {
     Perspective,
     /// Parallel lines stay parallel.
     Orthographic,
-}
-
-/// Views along an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StandardView {
-    /// From −y.
-    Front,
-    /// From +y.
-    Back,
-    /// From +x.
-    Right,
-    /// From −x.
-    Left,
-    /// From +z.
-    Top,
-    /// From −z.
-    Bottom,
-    /// From the corner between front, right and top.
-    Corner,
-}
-
-impl StandardView {
-    /// All views, in the order of menus.
-    pub const ALL: [Self; 7] = [
-        Self::Front,
-        Self::Back,
-        Self::Right,
-        Self::Left,
-        Self::Top,
-        Self::Bottom,
-        Self::Corner,
-    ];
-
-    /// The name in menus ("Front").
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::Front => "Front",
-            Self::Back => "Back",
-            Self::Right => "Right",
-            Self::Left => "Left",
-            Self::Top => "Top",
-            Self::Bottom => "Bottom",
-            Self::Corner => "Corner",
-        }
-    }
-
-    /// The name on the command line ("front").
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Front => "front",
-            Self::Back => "back",
-            Self::Right => "right",
-            Self::Left => "left",
-            Self::Top => "top",
-            Self::Bottom => "bottom",
-            Self::Corner => "corner",
-        }
-    }
-
-    /// Azimuth and elevation in radians.
-    fn angles(self) -> (f32, f32) {
-        match self {
-            Self::Front => (0.0, 0.0),
-            Self::Back => (PI, 0.0),
-            Self::Right => (FRAC_PI_2, 0.0),
-            Self::Left => (-FRAC_PI_2, 0.0),
-            Self::Top => (0.0, FRAC_PI_2),
-            Self::Bottom => (0.0, -FRAC_PI_2),
-            // The diagonal of a cube rises by asin(1/√3).
-            Self::Corner => (FRAC_PI_4, 0.615_479_7),
-        }
-    }
 }
 
 /// A ball that holds everything drawn, in world space.
@@ -121,10 +61,10 @@ impl BoundingSphere {
 pub struct Camera {
     /// The point that orbiting turns around, in world space.
     pub pivot: Vec3,
-    /// Angle around z; 0 looks along +y (from the front).
-    pub azimuth: f32,
-    /// Angle above the horizon, within ±π/2.
-    pub elevation: f32,
+    /// Rotation from view to world space, a unit quaternion.
+    pub orientation: Quat,
+    /// What stands upright: [`Self::orbit`] keeps it so, and views are named after it. [`Self::set_up_axis`] changes it.
+    pub up_axis: UpAxis,
     /// Depth of the pivot below the eye, > 0. Also sets the scale of the orthographic view.
     pub distance: f32,
     /// Where the pivot is seen, as an offset from the view axis (x right, y up, world length at the pivot's depth).
@@ -137,25 +77,108 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Looks at the whole box `min..max` from `view`.
-    pub fn framing(min: Vec3, max: Vec3, view: StandardView, aspect: f32) -> Self {
-        let (azimuth, elevation) = view.angles();
+    /// Looks at the origin from `view`, one unit away.
+    pub fn new(view: StandardView, up_axis: UpAxis) -> Self {
         let mut camera = Self {
             pivot: Vec3::ZERO,
-            azimuth,
-            elevation,
+            orientation: Quat::IDENTITY,
+            up_axis,
             distance: 1.0,
             pivot_offset: Vec2::ZERO,
             field_of_view: DEFAULT_FIELD_OF_VIEW,
             projection: Projection::default(),
         };
+        camera.set_view(view);
+        camera
+    }
+
+    /// Looks at the whole box `min..max` from `view`, with z up.
+    pub fn framing(min: Vec3, max: Vec3, view: StandardView, aspect: f32) -> Self {
+        let mut camera = Self::new(view, UpAxis::default());
         camera.frame(min, max, aspect);
         camera
     }
 
     /// Turns the view to `view`, keeping pivot, distance and projection.
     pub fn set_view(&mut self, view: StandardView) {
-        (self.azimuth, self.elevation) = view.angles();
+        let (azimuth, elevation) = view.angles();
+        self.set_angles(azimuth, elevation);
+    }
+
+    /// Looks at the pivot from that side of it, upright. `direction` points from the pivot toward the eye, of any length; one
+    /// that is zero or not finite changes nothing. Seen from above or below, the picture is that of the standard view.
+    pub fn look_from(&mut self, direction: Vec3) {
+        let Some(back) = (self.up_axis.frame().transpose() * direction).try_normalize() else {
+            return;
+        };
+        let across = back.truncate().length();
+        let azimuth = if across > LEVEL { back.x.atan2(-back.y) } else { 0.0 };
+        self.set_angles(azimuth, back.z.atan2(across));
+    }
+
+    /// Stands another axis upright and keeps the angles: what was seen from the front still is.
+    pub fn set_up_axis(&mut self, up_axis: UpAxis) {
+        let (azimuth, elevation) = self.angles();
+        self.up_axis = up_axis;
+        self.set_angles(azimuth, elevation);
+    }
+
+    /// Azimuth around the up axis (0 looks from the front, π/2 from the right) in ±π, and elevation above the horizon in
+    /// ±π/2, both in radians and without the roll.
+    pub fn angles(&self) -> (f32, f32) {
+        let upright = self.up_axis.frame().transpose();
+        let (right, back) = (upright * self.right(), upright * self.back());
+        let across = back.truncate().length();
+        let elevation = back.z.atan2(across);
+        // The right hand also tells at the poles, where the eye is above or below. Upside down it points the other way.
+        let is_level = right.z.abs() < LEVEL && (upright * self.up()).z > -LEVEL;
+        let azimuth = if is_level || across < LEVEL {
+            right.y.atan2(right.x)
+        } else {
+            back.x.atan2(-back.y)
+        };
+        (azimuth, elevation)
+    }
+
+    /// Turns the view to these angles, upright; see [`Self::angles`]. The elevation stops at the poles.
+    pub fn set_angles(&mut self, azimuth: f32, elevation: f32) {
+        let (sin_azimuth, cos_azimuth) = azimuth.sin_cos();
+        let (sin, cos) = elevation.clamp(-FRAC_PI_2, FRAC_PI_2).sin_cos();
+        let right = Vec3::new(cos_azimuth, sin_azimuth, 0.0);
+        let back = Vec3::new(cos * sin_azimuth, -cos * cos_azimuth, sin);
+        let upright = Mat3::from_cols(right, back.cross(right), back);
+        self.set_orientation(Quat::from_mat3(&(self.up_axis.frame() * upright)));
+    }
+
+    /// Takes the roll out: the horizon is level, and what is up in the world is up in the picture.
+    pub fn level(&mut self) {
+        let (azimuth, elevation) = self.angles();
+        self.set_angles(azimuth, elevation);
+    }
+
+    /// The only way in, so that rounding never adds up and an angle that is not finite changes nothing.
+    fn set_orientation(&mut self, orientation: Quat) {
+        let len = orientation.length();
+        if len.is_finite() && len > 0.0 {
+            self.orientation = orientation / len;
+        }
+    }
+
+    /// The camera on the way from `self` to `to`: `t` = 0 is `self` but for the projection, 1 is `to`. Directions turn evenly, the
+    /// distance grows or shrinks by the same factor in the same time.
+    pub fn toward(&self, to: &Self, t: f32) -> Self {
+        if t >= 1.0 {
+            return *to;
+        }
+        Self {
+            pivot: self.pivot.lerp(to.pivot, t),
+            orientation: self.orientation.slerp(to.orientation, t),
+            distance: self.distance * (to.distance / self.distance).powf(t),
+            pivot_offset: self.pivot_offset.lerp(to.pivot_offset, t),
+            field_of_view: self.field_of_view + t * (to.field_of_view - self.field_of_view),
+            up_axis: to.up_axis,
+            projection: to.projection,
+        }
     }
 
     /// Moves so that the box is framed, keeping the direction. A box that is empty or not finite changes nothing.
@@ -206,11 +229,51 @@ impl Camera {
         };
     }
 
-    /// Orbits by a pointer motion in pixels: the scene follows the pointer, the elevation stops at the poles.
+    /// Orbits as a turntable by a pointer motion in pixels: the scene follows the pointer, the elevation stops at the poles.
+    /// A roll is taken out.
     pub fn orbit(&mut self, delta: Vec2) {
-        let azimuth = self.azimuth - delta.x * RADIANS_PER_PIXEL;
-        self.azimuth = (azimuth + PI).rem_euclid(TAU) - PI;
-        self.elevation = (self.elevation + delta.y * RADIANS_PER_PIXEL).clamp(-FRAC_PI_2, FRAC_PI_2);
+        let (azimuth, elevation) = self.angles();
+        let angles = Vec2::new(azimuth, elevation) + Vec2::new(-delta.x, delta.y) * RADIANS_PER_PIXEL;
+        self.set_angles(angles.x, angles.y);
+    }
+
+    /// Orbits freely by a pointer motion in pixels: about the picture's own axes, over the poles.
+    pub fn turn(&mut self, delta: Vec2) {
+        let turn = Vec3::new(-delta.y, -delta.x, 0.0) * RADIANS_PER_PIXEL;
+        self.set_orientation(self.orientation * Quat::from_scaled_axis(turn));
+    }
+
+    /// Orbits freely as if the pointer rolled a ball in the middle of the picture, from pixel `from` to pixel `to`; along the
+    /// border of the picture the view rolls.
+    pub fn roll_ball(&mut self, from: Vec2, to: Vec2, size: Vec2) {
+        // A ball that flares into a sheet below the picture (Bell), so that there is no edge to fall off.
+        let on_ball = |pixel: Vec2| {
+            let across = (pixel - 0.5 * size) * Vec2::new(1.0, -1.0) / (0.5 * size.min_element());
+            let (len, ball) = (across.length_squared(), BALL_RADIUS * BALL_RADIUS);
+            let height = if len < 0.5 * ball {
+                (ball - len).sqrt()
+            } else {
+                0.5 * ball / len.sqrt()
+            };
+            across.extend(height).normalize_or(Vec3::Z)
+        };
+        let turn = Quat::from_rotation_arc(on_ball(to), on_ball(from));
+        self.set_orientation(self.orientation * turn);
+    }
+
+    /// Looks around from where the eye is, by a pointer motion in pixels: what is in the middle follows the pointer. A roll is
+    /// taken out, the elevation stops at the poles.
+    pub fn look(&mut self, delta: Vec2, size: Vec2) {
+        let eye = self.eye();
+        let (azimuth, elevation) = self.angles();
+        let angles = delta * (2.0 * (0.5 * self.field_of_view).tan() / size.y);
+        self.set_angles(azimuth + angles.x, elevation - angles.y);
+        self.pivot += eye - self.eye();
+    }
+
+    /// Moves eye and pivot to the right, up and forward, in world lengths.
+    pub fn travel(&mut self, by: Vec3) {
+        self.pivot += self.right() * by.x + self.up() * by.y - self.back() * by.z;
     }
 
     /// Pans by a pointer motion in pixels, so that what is at the pivot's depth follows the pointer.
@@ -250,20 +313,17 @@ impl Camera {
 
     /// Unit vector to the right of the picture, in world space.
     pub fn right(&self) -> Vec3 {
-        let (sin, cos) = self.azimuth.sin_cos();
-        Vec3::new(cos, sin, 0.0)
+        self.orientation * Vec3::X
     }
 
     /// Unit vector to the top of the picture, in world space.
     pub fn up(&self) -> Vec3 {
-        self.back().cross(self.right())
+        self.orientation * Vec3::Y
     }
 
     /// Unit vector from the scene toward the eye, in world space.
     pub fn back(&self) -> Vec3 {
-        let (sin_azimuth, cos_azimuth) = self.azimuth.sin_cos();
-        let (sin, cos) = self.elevation.sin_cos();
-        Vec3::new(cos * sin_azimuth, -cos * cos_azimuth, sin)
+        self.orientation * Vec3::Z
     }
 
     /// Position of the eye in world space.
@@ -273,7 +333,7 @@ impl Camera {
 
     /// Rotation from world to view space.
     pub(crate) fn view_rotation(&self) -> Mat3 {
-        Mat3::from_cols(self.right(), self.up(), self.back()).transpose()
+        Mat3::from_quat(self.orientation).transpose()
     }
 
     /// Depths (along the view axis, from the eye) of the near and the far plane that hold `scene`. The far plane of a
@@ -352,201 +412,4 @@ fn limit_distance(distance: f32, around: Vec3) -> f32 {
 }
 
 #[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    const SIZE: Vec2 = Vec2::new(1280.0, 720.0);
-
-    fn cameras() -> impl Strategy<Value = Camera> {
-        (
-            prop::array::uniform3(-5.0_f32..5.0),
-            -PI..PI,
-            -FRAC_PI_2..=FRAC_PI_2,
-            0.5_f32..20.0,
-            prop::array::uniform2(-1.0_f32..1.0),
-            prop::bool::ANY,
-        )
-            .prop_map(|(pivot, azimuth, elevation, distance, offset, perspective)| Camera {
-                pivot: Vec3::from_array(pivot),
-                azimuth,
-                elevation,
-                distance,
-                pivot_offset: Vec2::from_array(offset),
-                field_of_view: DEFAULT_FIELD_OF_VIEW,
-                projection: if perspective {
-                    Projection::Perspective
-                } else {
-                    Projection::Orthographic
-                },
-            })
-    }
-
-    fn pixels() -> impl Strategy<Value = Vec2> {
-        (0.0..SIZE.x, 0.0..SIZE.y).prop_map(|(x, y)| Vec2::new(x, y))
-    }
-
-    proptest! {
-        #[test]
-        fn project_inverts_unproject(camera in cameras(), pixel in pixels(), depth in 0.3_f32..30.0) {
-            let point = camera.unproject(pixel, depth, SIZE);
-            let back = camera.project(point, SIZE).unwrap();
-            prop_assert!(back.distance(pixel) < 0.05, "{back} from {pixel}");
-        }
-
-        #[test]
-        fn the_matrix_projects_as_project_does(camera in cameras(), pixel in pixels(), depth in 0.3_f32..30.0) {
-            let scene = BoundingSphere { center: camera.pivot, radius: 40.0 };
-            let point = camera.unproject(pixel, depth, SIZE);
-            let in_view = camera.view_rotation() * (point - camera.eye());
-            let clip = camera.clip_from_view(SIZE.x / SIZE.y, scene) * in_view.extend(1.0);
-            let ndc = clip / clip.w;
-            let seen = (Vec2::new(ndc.x, -ndc.y) * 0.5 + 0.5) * SIZE;
-            prop_assert!(seen.distance(pixel) < 0.05, "{seen} from {pixel}");
-            prop_assert!((0.0..=1.0).contains(&ndc.z), "z {}", ndc.z);
-            let a = camera.depth_from_clip(scene);
-            let depth_again = (a.x + a.y * ndc.z) / (a.z + a.w * ndc.z);
-            prop_assert!((depth_again - depth).abs() < 1e-4 * depth.max(1.0) + 1e-5 * 80.0, "{depth_again} from {depth}");
-        }
-
-        #[test]
-        fn zoom_keeps_what_is_under_the_pointer(
-            camera in cameras(), pixel in pixels(), depth in 0.5_f32..30.0, factor in 0.3_f32..3.0, known in prop::bool::ANY
-        ) {
-            let mut zoomed = camera;
-            let at = camera.unproject(pixel, if known { depth } else { camera.distance }, SIZE);
-            zoomed.zoom(factor, pixel, SIZE, known.then_some(at));
-            let seen = zoomed.project(at, SIZE).unwrap();
-            prop_assert!(seen.distance(pixel) < 0.1, "{seen} from {pixel}");
-            prop_assert!((zoomed.distance * factor / camera.distance - 1.0).abs() < 1e-4);
-        }
-
-        #[test]
-        fn pan_moves_the_pivots_place_by_the_pointer(camera in cameras(), x in -300.0_f32..300.0, y in -300.0_f32..300.0) {
-            let mut panned = camera;
-            let before = camera.project(camera.pivot, SIZE).unwrap();
-            panned.pan(Vec2::new(x, y), SIZE);
-            let after = panned.project(camera.pivot, SIZE).unwrap();
-            prop_assert!((after - before).distance(Vec2::new(x, y)) < 0.05, "{before} to {after}");
-        }
-
-        #[test]
-        fn a_new_pivot_keeps_the_picture_and_stays_in_place_while_orbiting(
-            camera in cameras(), pixel in pixels(), depth in 0.5_f32..30.0, other in pixels()
-        ) {
-            let mut turned = camera;
-            let pivot = camera.unproject(pixel, depth, SIZE);
-            let elsewhere = camera.unproject(other, 0.5 * depth, SIZE);
-            turned.set_pivot(pivot);
-            prop_assert!(turned.project(elsewhere, SIZE).unwrap().distance(other) < 0.1);
-            turned.orbit(Vec2::new(40.0, -25.0));
-            prop_assert!(turned.project(pivot, SIZE).unwrap().distance(pixel) < 0.1);
-        }
-
-        #[test]
-        fn a_framed_box_is_inside_the_picture(
-            camera in cameras(), min in prop::array::uniform3(-9.0_f32..0.0), len in prop::array::uniform3(0.01_f32..9.0)
-        ) {
-            let mut camera = camera;
-            let (min, len) = (Vec3::from_array(min), Vec3::from_array(len));
-            camera.frame(min, min + len, SIZE.x / SIZE.y);
-            for corner in 0..8 {
-                let pick = Vec3::new((corner & 1) as f32, (corner >> 1 & 1) as f32, (corner >> 2 & 1) as f32);
-                let seen = camera.project(min + len * pick, SIZE).unwrap();
-                prop_assert!(seen.cmpge(Vec2::ZERO).all() && seen.cmple(SIZE).all(), "corner {corner} at {seen}");
-            }
-        }
-
-        #[test]
-        fn framed_points_fill_the_picture_from_edge_to_edge(
-            camera in cameras(),
-            points in prop::collection::vec(prop::array::uniform3(-9.0_f32..9.0).prop_map(Vec3::from_array), 2..20),
-        ) {
-            let mut camera = camera;
-            camera.frame_points(points.iter().copied(), SIZE.x / SIZE.y);
-            let seen = points.iter().map(|&point| camera.project(point, SIZE).unwrap());
-            let empty = (Vec2::INFINITY, Vec2::NEG_INFINITY);
-            let (min, max) = seen.fold(empty, |(min, max), pixel| (min.min(pixel), max.max(pixel)));
-            prop_assert!(min.cmpge(Vec2::ZERO).all() && max.cmple(SIZE).all(), "{min} {max}");
-            // Without the margin, two of them touch opposite edges. In perspective the eye may have to stand in one of them.
-            camera.distance /= FRAME_MARGIN;
-            let (min, max) = points
-                .iter()
-                .filter_map(|&point| camera.project(point, SIZE))
-                .fold(empty, |(min, max), pixel| (min.min(pixel), max.max(pixel)));
-            let fills = ((max - min) / SIZE).max_element() > 0.99;
-            prop_assert!(fills || camera.projection == Projection::Perspective, "{min} {max}");
-        }
-    }
-
-    #[test]
-    fn standard_views_look_from_their_side_with_a_steady_up() {
-        let check = |view: StandardView, back: Vec3, up: Vec3| {
-            let camera = Camera::framing(Vec3::splat(-1.0), Vec3::splat(1.0), view, 1.5);
-            assert!(camera.back().distance(back) < 1e-6, "{view:?} {}", camera.back());
-            assert!(camera.up().distance(up) < 1e-6, "{view:?} {}", camera.up());
-        };
-        check(StandardView::Front, Vec3::NEG_Y, Vec3::Z);
-        check(StandardView::Back, Vec3::Y, Vec3::Z);
-        check(StandardView::Right, Vec3::X, Vec3::Z);
-        check(StandardView::Left, Vec3::NEG_X, Vec3::Z);
-        check(StandardView::Top, Vec3::Z, Vec3::Y);
-        check(StandardView::Bottom, Vec3::NEG_Z, Vec3::NEG_Y);
-        let corner = Camera::framing(Vec3::splat(-1.0), Vec3::splat(1.0), StandardView::Corner, 1.0);
-        assert!(corner.back().distance(Vec3::new(1.0, -1.0, 1.0) / 3.0_f32.sqrt()) < 1e-6);
-    }
-
-    #[test]
-    fn framing_centers_what_is_seen_not_the_box() {
-        // A pyramid: from the corner, its box reaches far above its tip's sides.
-        let points = [
-            Vec3::ZERO,
-            Vec3::X,
-            Vec3::Y,
-            Vec3::new(1.0, 1.0, 0.0),
-            Vec3::new(0.5, 0.5, 1.5),
-        ];
-        let mut camera = Camera::framing(
-            Vec3::ZERO,
-            Vec3::new(1.0, 1.0, 1.5),
-            StandardView::Corner,
-            SIZE.x / SIZE.y,
-        );
-        camera.frame_points(points, SIZE.x / SIZE.y);
-        let seen = points.map(|point| camera.project(point, SIZE).unwrap());
-        let (min, max) = seen.iter().fold((SIZE, Vec2::ZERO), |(min, max), &pixel| {
-            (min.min(pixel), max.max(pixel))
-        });
-        let above_and_below = [min.y, SIZE.y - max.y];
-        assert!(
-            above_and_below.iter().all(|&room| room > 5.0 && room < 0.06 * SIZE.y),
-            "{above_and_below:?}"
-        );
-    }
-
-    #[test]
-    fn orbit_stops_at_the_poles() {
-        let mut camera = Camera::framing(Vec3::splat(-1.0), Vec3::splat(1.0), StandardView::Front, 1.0);
-        camera.orbit(Vec2::new(0.0, 1e6));
-        assert_eq!(camera.elevation, FRAC_PI_2);
-        camera.orbit(Vec2::new(1e6, -1e7));
-        assert_eq!(camera.elevation, -FRAC_PI_2);
-        assert!(camera.azimuth.abs() <= PI && camera.eye().is_finite());
-    }
-
-    #[test]
-    fn degenerate_boxes_and_endless_zoom_stay_finite() {
-        let mut camera = Camera::framing(Vec3::ONE, Vec3::ONE, StandardView::Corner, 1.0);
-        assert_eq!(camera.distance, 1.0);
-        let before = camera;
-        camera.frame(Vec3::splat(f32::INFINITY), Vec3::splat(f32::NEG_INFINITY), 1.0);
-        assert_eq!(camera, before);
-        for factor in [1e3, 1e-3] {
-            for _ in 0..100 {
-                camera.zoom(factor, Vec2::new(3.0, 9.0), SIZE, None);
-            }
-            assert!(camera.eye().is_finite() && camera.distance > 0.0, "{camera:?}");
-        }
-    }
-}
+mod tests;

@@ -18,7 +18,7 @@ mod shader;
 #[cfg(test)]
 mod picture_tests;
 
-pub use camera::{BoundingSphere, Camera, Projection, StandardView};
+pub use camera::{BoundingSphere, Camera, Projection, StandardView, UpAxis};
 pub use display_mode::{DisplayMode, DrawSettings, Palette};
 /// The one wgpu of the workspace: the version that eframe draws with.
 pub use egui_wgpu::wgpu;

@@ -35,7 +35,7 @@ fn a_sphere_is_closed_and_all_back_from_inside() {
     let Some(mut scene) = Scene::new(&cloud) else { return };
     scene.camera.distance = 0.2;
     for azimuth in [0.0, 1.0, 2.0] {
-        scene.camera.azimuth = azimuth;
+        scene.camera.set_angles(azimuth, 0.0);
         let picture = scene.shoot();
         assert_eq!(picture.count_front(), (0, (SIZE[0] * SIZE[1]) as usize));
     }
