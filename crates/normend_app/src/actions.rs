@@ -15,7 +15,7 @@ use crate::panels::open_path::OpenPathWindow;
 use crate::panels::status_bar;
 use crate::scene_sync::Scene;
 use crate::session::Session;
-use crate::settings::SPLAT_SCALES;
+use crate::settings::{Purpose, SPLAT_SCALES};
 use crate::theme;
 use crate::work::{ScanOrigin, Uploaded, Work};
 
@@ -152,12 +152,12 @@ impl App {
         match command {
             Command::Open => self
                 .dialogs
-                .pick_scan(&self.ctx, self.settings.settings.open_folder.as_deref()),
+                .pick_scan(&self.ctx, self.settings.settings.folder(Purpose::Open)),
             Command::OpenPath => self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(None))),
             Command::OpenSample => self.leave(Leaving::Open(ScanOrigin::Sample)),
             Command::Export => {
                 if let Some(session) = &self.session {
-                    let suggested = session.suggested_export(self.settings.settings.export_folder.as_deref());
+                    let suggested = session.suggested_export(self.settings.settings.folder(Purpose::Export));
                     let window = ExportWindow::new(&suggested, session.scan.path().cloned());
                     self.windows.modal = Some(Modal::Export(window));
                 }
@@ -399,7 +399,7 @@ impl App {
                     });
                 }
                 Some(Ok(())) => {
-                    self.settings.settings.export_folder = path.parent().map(std::path::Path::to_path_buf);
+                    self.settings.settings.remember_folder(Purpose::Export, &path);
                     if let Some(session) = &mut self.session {
                         session.mark_saved(revision, parameters);
                         let n_points = theme::counted(session.scan.cloud.n_points() as u64, "point", "points");

@@ -16,7 +16,8 @@ use crate::panels::{
 };
 use crate::scene_sync::{Scene, Target};
 use crate::session::Session;
-use crate::settings::SettingsStore;
+use crate::run;
+use crate::settings::{SettingsStore, WindowPlace};
 use crate::theme;
 use crate::tools::mend::MendTool;
 use crate::tools::{Tool, ToolEvent};
@@ -67,7 +68,7 @@ pub struct App {
     gpu_errors: mpsc::Receiver<String>,
     can_drop: bool,
     title: String,
-    window_size: Option<[f32; 2]>,
+    window_place: WindowPlace,
 }
 
 impl App {
@@ -86,6 +87,8 @@ impl App {
     ) -> Self {
         theme::apply(&cc.egui_ctx);
         cc.egui_ctx.set_theme(settings.settings.theme.preference());
+        settings.settings.keys.clone().install(&cc.egui_ctx);
+        let window_place = settings.settings.window;
         let mut messages = Messages::default();
         if let Some(problem) = problem {
             messages.error(problem);
@@ -136,7 +139,7 @@ impl App {
             // winit gives no dropped files on Wayland.
             can_drop: std::env::var_os("WAYLAND_DISPLAY").is_none_or(|name| name.is_empty()),
             title: String::new(),
-            window_size: None,
+            window_place,
         };
         if let Some(path) = scan {
             app.open(ScanOrigin::File(path));
@@ -189,7 +192,7 @@ impl App {
             mode: self.mode,
             palette: theme::palette(self.settings.settings.palette, dark),
             splat_scale: self.settings.settings.splat_scale,
-            stride: 1,
+            ..DrawSettings::default()
         }
     }
 
@@ -520,10 +523,8 @@ impl App {
 
     fn keep_settings(&mut self) {
         self.ctx.set_theme(self.settings.settings.theme.preference());
-        let (pressed, rect) = self
-            .ctx
-            .input(|input| (input.pointer.any_down(), input.viewport().inner_rect));
-        self.window_size = rect.map(|rect| [rect.width(), rect.height()]);
+        self.ctx.set_zoom_factor(self.settings.settings.ui_scale);
+        let pressed = self.ctx.input(|input| input.pointer.any_down());
         // Not in the middle of a drag: a slider would write the file with every step.
         if !pressed && let Err(problem) = self.settings.save_if_changed() {
             self.messages.error(problem);
@@ -533,6 +534,7 @@ impl App {
 
 impl eframe::App for App {
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        self.window_place = run::window_place(ui.ctx(), self.window_place);
         self.take_gpu_errors();
         self.take_dialogs();
         self.take_work();
@@ -557,9 +559,7 @@ impl eframe::App for App {
     }
 
     fn on_exit(&mut self) {
-        if let Some(size) = self.window_size {
-            self.settings.settings.window_size = size;
-        }
+        self.settings.settings.window = self.window_place;
         if let Err(problem) = self.settings.save_if_changed() {
             tracing::warn!("{problem}");
         }

@@ -9,6 +9,7 @@ mod actions;
 pub mod app;
 pub mod command;
 mod dialogs;
+pub mod folders;
 pub mod job;
 pub mod messages;
 mod pace;

@@ -9,7 +9,7 @@ use eframe::egui_wgpu::{WgpuConfiguration, WgpuSetupCreateNew};
 use normend_render::SplatRenderer;
 
 use crate::app::App;
-use crate::settings::SettingsStore;
+use crate::settings::{SettingsStore, WindowPlace};
 
 const MIN_SIZE: [f32; 2] = [900.0, 600.0];
 
@@ -19,7 +19,7 @@ const MIN_SIZE: [f32; 2] = [900.0, 600.0];
 /// In words for the user: no display, no graphics driver, and the package that gives it.
 pub fn run(scan: Option<PathBuf>) -> anyhow::Result<()> {
     let (settings, problem) = SettingsStore::load();
-    let options = options(settings.settings.window_size);
+    let options = options(settings.settings.window);
     // Missing libraries of the window system are panics of its bindings; they become words like all other errors.
     let last_panic = Arc::new(Mutex::new(None));
     let seen = Arc::clone(&last_panic);
@@ -55,14 +55,45 @@ pub fn graphics_setup() -> WgpuSetupCreateNew {
     }
 }
 
-fn options(window_size: [f32; 2]) -> eframe::NativeOptions {
+/// Where the window is now, given where it was before this frame.
+pub(crate) fn window_place(ctx: &egui::Context, before: WindowPlace) -> WindowPlace {
+    // Points shrink with the scale of the interface; the window does not.
+    let scale = ctx.zoom_factor();
+    ctx.input(|input| {
+        let window = input.viewport();
+        let maximized = window.maximized.unwrap_or(false);
+        let (Some(inner), false) = (window.inner_rect, maximized || window.minimized == Some(true)) else {
+            return WindowPlace { maximized, ..before };
+        };
+        // Only the first screen is sure to be there next time.
+        let corner = window.outer_rect.map(|outer| outer.min);
+        let is_on_first_screen = |corner: &egui::Pos2| {
+            let room = window.monitor_size.unwrap_or_default();
+            (0.0..room.x).contains(&corner.x) && (0.0..room.y).contains(&corner.y)
+        };
+        WindowPlace {
+            size: [inner.width() * scale, inner.height() * scale],
+            position: corner
+                .filter(is_on_first_screen)
+                .map(|corner| [corner.x * scale, corner.y * scale]),
+            maximized,
+        }
+    })
+}
+
+fn options(place: WindowPlace) -> eframe::NativeOptions {
+    let mut viewport = egui::ViewportBuilder::default()
+        .with_title("Normend")
+        .with_app_id("normend")
+        .with_inner_size(place.size)
+        .with_min_inner_size(MIN_SIZE)
+        .with_maximized(place.maximized)
+        .with_icon(icon());
+    if let Some(position) = place.position {
+        viewport = viewport.with_position(position);
+    }
     eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default()
-            .with_title("Normend")
-            .with_app_id("normend")
-            .with_inner_size(window_size)
-            .with_min_inner_size(MIN_SIZE)
-            .with_icon(icon()),
+        viewport,
         renderer: eframe::Renderer::Wgpu,
         wgpu_options: WgpuConfiguration {
             wgpu_setup: graphics_setup().into(),

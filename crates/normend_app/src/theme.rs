@@ -125,6 +125,8 @@ pub fn apply(ctx: &egui::Context) {
         // A press that moves farther is a drag of the camera, not a mend; a press may be as long as it likes.
         options.input_options.max_click_dist = 4.0;
         options.input_options.max_click_duration = 60.0;
+        // The scale of the interface is a setting with commands of its own.
+        options.zoom_with_keyboard = false;
     });
 }
 
@@ -167,18 +169,35 @@ fn visuals(theme: Theme) -> egui::Visuals {
     visuals
 }
 
-/// The colors of the 3D view; blue and orange stand before the theme's own background.
+/// The colors of the 3D view; colors stand before the theme's own background.
 pub fn palette(choice: PaletteChoice, dark: bool) -> Palette {
     match choice {
         PaletteChoice::BlueOrange => Palette {
-            background: if dark {
-                [0.085, 0.095, 0.11]
-            } else {
-                [0.88, 0.895, 0.915]
-            },
+            background: background(dark),
             ..Palette::BLUE_ORANGE
         },
+        PaletteChoice::GreenPurple => Palette {
+            front: [0.45, 0.80, 0.45],
+            back: [0.55, 0.30, 0.75],
+            highlight: [1.0, 0.93, 0.25],
+            background: background(dark),
+        },
+        PaletteChoice::YellowBlue => Palette {
+            front: [0.95, 0.85, 0.40],
+            back: [0.16, 0.36, 0.78],
+            highlight: [1.0, 0.45, 0.40],
+            background: background(dark),
+        },
         PaletteChoice::Paper => Palette::PAPER,
+    }
+}
+
+/// What stands behind colored splats.
+fn background(dark: bool) -> [f32; 3] {
+    if dark {
+        [0.085, 0.095, 0.11]
+    } else {
+        [0.88, 0.895, 0.915]
     }
 }
 

@@ -4,13 +4,80 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use egui::{Id, Key, KeyboardShortcut, ModifierNames, Modifiers};
+use serde::{Deserialize, Serialize};
 
 use super::Command;
 
 /// The keys of all commands. Only what differs from the table is kept.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "NamedKeys", try_from = "NamedKeys")]
 pub struct Keymap {
     changed: BTreeMap<Command, Vec<KeyboardShortcut>>,
+}
+
+/// As settings have it: keys in words by the name of their command.
+type NamedKeys = BTreeMap<String, Vec<String>>;
+
+impl From<Keymap> for NamedKeys {
+    fn from(keymap: Keymap) -> Self {
+        let named = |(command, keys): (Command, Vec<KeyboardShortcut>)| {
+            let keys = keys.iter().map(written).collect();
+            (command.name().to_owned(), keys)
+        };
+        keymap.changed.into_iter().map(named).collect()
+    }
+}
+
+impl TryFrom<NamedKeys> for Keymap {
+    type Error = String;
+
+    /// Commands that are not known may be of another version, and are left out.
+    fn try_from(named: NamedKeys) -> Result<Self, String> {
+        let mut keymap = Self::default();
+        for (name, keys) in named {
+            let parsed: Result<Vec<_>, String> = keys
+                .iter()
+                .map(|text| parsed(text).ok_or_else(|| format!("“{text}” is no key")))
+                .collect();
+            let keys = parsed?;
+            if let Some(command) = Command::from_name(&name) {
+                keymap.set(command, keys);
+            }
+        }
+        Ok(keymap)
+    }
+}
+
+/// A key for files, the same on every system: "Ctrl+Shift+Z", "Alt+ArrowUp".
+fn written(shortcut: &KeyboardShortcut) -> String {
+    let held = shortcut.modifiers;
+    let mut text = String::new();
+    for (is_held, name) in [
+        (held.command || held.ctrl, "Ctrl+"),
+        (held.alt, "Alt+"),
+        (held.shift, "Shift+"),
+    ] {
+        if is_held {
+            text.push_str(name);
+        }
+    }
+    text + shortcut.logical_key.name()
+}
+
+/// The key that [`written`] wrote.
+fn parsed(text: &str) -> Option<KeyboardShortcut> {
+    let mut modifiers = Modifiers::NONE;
+    let mut rest = text;
+    while let Some((held, key)) = rest.split_once('+') {
+        modifiers |= match held {
+            "Ctrl" => Modifiers::COMMAND,
+            "Alt" => Modifiers::ALT,
+            "Shift" => Modifiers::SHIFT,
+            _ => return None,
+        };
+        rest = key;
+    }
+    Some(KeyboardShortcut::new(modifiers, Key::from_name(rest)?))
 }
 
 impl Keymap {
@@ -27,6 +94,61 @@ impl Keymap {
     /// The keys of a command, the usual one first.
     pub fn keys(&self, command: Command) -> &[KeyboardShortcut] {
         self.changed.get(&command).map_or(command.row().keys, Vec::as_slice)
+    }
+
+    /// Gives a command these keys, which may be none.
+    pub fn set(&mut self, command: Command, keys: Vec<KeyboardShortcut>) {
+        if keys == command.row().keys {
+            self.changed.remove(&command);
+        } else {
+            self.changed.insert(command, keys);
+        }
+    }
+
+    /// Adds a key to those of a command. Another command that had it loses it.
+    pub fn add(&mut self, command: Command, shortcut: KeyboardShortcut) {
+        while let Some(other) = self.owner(shortcut) {
+            self.remove(other, shortcut);
+        }
+        let mut keys = self.keys(command).to_vec();
+        keys.push(shortcut);
+        self.set(command, keys);
+    }
+
+    /// Takes a key from a command.
+    pub fn remove(&mut self, command: Command, shortcut: KeyboardShortcut) {
+        let keys = self.keys(command).iter().copied().filter(|&key| key != shortcut);
+        let keys = keys.collect();
+        self.set(command, keys);
+    }
+
+    /// Gives a command the keys of the table, and takes them from others.
+    pub fn reset(&mut self, command: Command) {
+        self.changed.remove(&command);
+        for &shortcut in command.default_keys() {
+            let others = Command::ALL.iter().copied().filter(|&other| other != command);
+            for other in others
+                .filter(|&other| self.keys(other).contains(&shortcut))
+                .collect::<Vec<_>>()
+            {
+                self.remove(other, shortcut);
+            }
+        }
+    }
+
+    /// Gives every command the keys of the table.
+    pub fn reset_all(&mut self) {
+        self.changed.clear();
+    }
+
+    /// Whether a command has other keys than in the table.
+    pub fn is_changed(&self, command: Command) -> bool {
+        self.changed.contains_key(&command)
+    }
+
+    /// Whether every command has the keys of the table.
+    pub fn is_default(&self) -> bool {
+        self.changed.is_empty()
     }
 
     /// The command that a key gives.
@@ -160,6 +282,60 @@ mod tests {
     }
 
     #[test]
+    fn every_key_can_be_kept_in_a_file() {
+        for &key in Key::ALL {
+            for modifiers in [
+                Modifiers::NONE,
+                Modifiers::COMMAND,
+                Modifiers::ALT | Modifiers::SHIFT,
+                Modifiers::COMMAND | Modifiers::ALT | Modifiers::SHIFT,
+            ] {
+                let shortcut = KeyboardShortcut::new(modifiers, key);
+                assert_eq!(parsed(&written(&shortcut)), Some(shortcut), "{}", written(&shortcut));
+            }
+        }
+        for text in ["", "Ctrl", "Ctrl+", "Hyper+A", "Ctrl+Nothing", "+"] {
+            assert_eq!(parsed(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_key_belongs_to_one_command() {
+        let mut keymap = Keymap::default();
+        let f = key(Key::F);
+        keymap.add(Command::Export, f);
+        assert_eq!(keymap.owner(f), Some(Command::Export));
+        assert_eq!(
+            keymap.keys(Command::Export),
+            [Command::Export.default_keys(), &[f]].concat()
+        );
+        assert!(keymap.keys(Command::FrameAll).is_empty());
+        keymap.reset(Command::FrameAll);
+        assert_eq!(keymap.owner(f), Some(Command::FrameAll));
+        assert!(keymap.is_default());
+        keymap.remove(Command::FrameAll, f);
+        assert_eq!((keymap.owner(f), keymap.is_changed(Command::FrameAll)), (None, true));
+        keymap.reset_all();
+        assert!(keymap.is_default());
+    }
+
+    #[test]
+    fn the_keys_of_the_user_are_shown_and_taken() {
+        let ctx = egui::Context::default();
+        let mut keymap = Keymap::default();
+        keymap.set(Command::Undo, vec![key(Key::U)]);
+        keymap.install(&ctx);
+        assert_eq!(Command::Undo.keys_text(&ctx), "U");
+        assert_eq!(Command::Undo.tooltip_with_keys(&ctx), "Take the last edit back (U)");
+        press(&ctx, Modifiers::NONE, Key::U, false, false, &[Command::Undo]);
+        press(&ctx, Modifiers::COMMAND | Modifiers::CTRL, Key::Z, false, false, &[]);
+    }
+
+    fn key(key: Key) -> KeyboardShortcut {
+        KeyboardShortcut::new(Modifiers::NONE, key)
+    }
+
+    #[test]
     fn keys_are_named_as_they_are_written() {
         let ctx = egui::Context::default();
         let check = |command: Command, expect: &str| assert_eq!(command.keys_text(&ctx), expect);
@@ -188,7 +364,24 @@ mod tests {
     }
 
     fn check(modifiers: Modifiers, key: Key, typing: bool, widget_focused: bool, expect: &[Command]) {
-        let ctx = egui::Context::default();
+        press(
+            &egui::Context::default(),
+            modifiers,
+            key,
+            typing,
+            widget_focused,
+            expect,
+        );
+    }
+
+    fn press(
+        ctx: &egui::Context,
+        modifiers: Modifiers,
+        key: Key,
+        typing: bool,
+        widget_focused: bool,
+        expect: &[Command],
+    ) {
         let input = egui::RawInput {
             events: vec![egui::Event::Key {
                 key,
