@@ -49,7 +49,7 @@ pub mod metrics;
 
 pub mod shapes;
 
-pub use document::{Document, Edit, EditError};
+pub use document::{Document, Edit, EditError, EditKind, Mark, StateChange};
 pub use neighbors::Neighbors;
 pub use normals::Estimator;
 pub use orientation::{Change, Orientation};
@@ -59,6 +59,8 @@ pub use progress::{Cancelled, Progress, Silent};
 pub use propagation::{Method, Parameters, Preset, Propagation, SourceRule, Stage, Start};
 pub use regions::Regions;
 pub use riemannian_graph::{EdgeRule, RiemannianGraph};
+/// A set of points, by id: compressed, fast to combine.
+pub use roaring::RoaringBitmap as PointSet;
 pub use side_rule::SideRule;
 pub use sources::{Source, Sources};
 pub use spanning_tree::SpanningTree;

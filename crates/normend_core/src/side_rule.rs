@@ -11,7 +11,7 @@ use crate::progress::Part;
 use crate::{Cancelled, PointCloud, Progress};
 
 /// What the right side of a surface is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SideRule {
     /// The side that the scanner stood on, where its place is known or found ([`evidence::find_station`]); else outward.
     #[default]

@@ -4,24 +4,62 @@ use std::collections::BTreeMap;
 
 use glam::Vec3;
 
+use crate::SideRule;
+
 /// Where a source comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Origin {
     /// The user's click.
     Picked,
     /// A component's default source (its point farthest along +z), vouched for when the user first mended a patch beside
     /// it.
     Default,
+    /// A selection that was said to be right, and that the rest follows.
+    Selected,
+    /// The user's own view, which sees its right side.
+    Seen,
+    /// A rule for the right side of a component.
+    Rule(SideRule),
     /// Viewpoints around the cloud that see it (Liu et al. §3.4).
     Voted,
 }
 
 impl Origin {
+    /// All origins, in the order of lists; one for each rule.
+    pub const ALL: [Self; 11] = [
+        Self::Picked,
+        Self::Default,
+        Self::Selected,
+        Self::Seen,
+        Self::Rule(SideRule::Automatic),
+        Self::Rule(SideRule::Outward),
+        Self::Rule(SideRule::TowardScanner),
+        Self::Rule(SideRule::Up),
+        Self::Rule(SideRule::IntoRoom),
+        Self::Rule(SideRule::Given),
+        Self::Voted,
+    ];
+
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Picked => "picked",
+            Self::Default => "default",
+            Self::Selected => "selected",
+            Self::Seen => "seen",
+            Self::Rule(rule) => rule.name(),
+            Self::Voted => "voted",
+        }
+    }
+
     /// The name in lists.
     pub fn label(self) -> &'static str {
         match self {
             Self::Picked => "Picked",
             Self::Default => "Default",
+            Self::Selected => "Selection",
+            Self::Seen => "Seen",
+            Self::Rule(_) => "Rule",
             Self::Voted => "Voted",
         }
     }
@@ -61,12 +99,7 @@ impl Source {
     /// A perpendicular direction has no side, so its first component that is not zero decides; opposite directions thus
     /// always want opposite signs.
     pub fn turns(&self, stored: Vec3) -> bool {
-        let dot = self.normal.dot(stored);
-        if dot != 0.0 {
-            return dot < 0.0;
-        }
-        let first = self.normal.to_array().into_iter().find(|&component| component != 0.0);
-        first.is_some_and(|component| component < 0.0)
+        direction_turns(self.normal, stored)
     }
 
     /// The same source vouching for the opposite side; its patch turns.
@@ -89,6 +122,16 @@ impl Source {
             ..self.opposite()
         }
     }
+}
+
+/// Whether a `stored` normal must turn to point to the side of `direction`; see [`Source::turns`].
+pub(crate) fn direction_turns(direction: Vec3, stored: Vec3) -> bool {
+    let dot = direction.dot(stored);
+    if dot != 0.0 {
+        return dot < 0.0;
+    }
+    let first = direction.to_array().into_iter().find(|&component| component != 0.0);
+    first.is_some_and(|component| component < 0.0)
 }
 
 /// The sources of a document, by point id, at most one a point.

@@ -174,6 +174,21 @@ impl SpanningTree {
         (parent != position).then_some(parent)
     }
 
+    /// The component that `position` belongs to, as an index of [`Self::roots`]. O(log components).
+    pub fn component(&self, position: u32) -> usize {
+        // The first root is at position 0, so at least one counts.
+        self.roots().partition_point(|&root| root <= position) - 1
+    }
+
+    /// The positions whose parent is `position`, ascending.
+    pub fn children(&self, position: u32) -> impl Iterator<Item = u32> {
+        let end = self.subtree(position).end;
+        let first = Some(position + 1).filter(|&child| child < end);
+        std::iter::successors(first, move |&child| {
+            Some(self.subtree(child).end).filter(|&next| next < end)
+        })
+    }
+
     /// The positions of the subtree of `position`, itself first.
     #[inline]
     pub fn subtree(&self, position: u32) -> Range<u32> {

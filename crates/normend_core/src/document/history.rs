@@ -2,30 +2,46 @@
 
 use std::collections::VecDeque;
 
-use super::Edit;
-use crate::Source;
-
-/// The source at one point before and after an edit.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct SourceChange {
-    pub point: u32,
-    pub before: Option<Source>,
-    pub after: Option<Source>,
-}
+use super::{EditKind, StateChange};
 
 /// An applied edit with its inverse. It holds points and directions, no signs and no positions in a tree, so it stays
 /// valid when the propagation changes.
-#[derive(Debug)]
-pub(super) struct Step {
-    pub edit: Edit,
-    pub changes: Box<[SourceChange]>,
-    pub revision_before: u64,
-    pub revision_after: u64,
+#[derive(Clone, Debug)]
+pub struct Step {
+    pub(super) kind: EditKind,
+    pub(super) forward: StateChange,
+    pub(super) backward: StateChange,
+    pub(super) n_turned: u64,
+    pub(super) revisions: [Revisions; 2],
+}
+
+/// The numbers of a state.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Revisions {
+    /// Names the whole state.
+    pub all: u64,
+    /// Names what signs depend on.
+    pub signs: u64,
 }
 
 impl Step {
+    /// What was done.
+    pub fn kind(&self) -> EditKind {
+        self.kind
+    }
+
+    /// The change of the state that it made.
+    pub fn change(&self) -> &StateChange {
+        &self.forward
+    }
+
+    /// How many points turned when it was first done.
+    pub fn n_turned(&self) -> u64 {
+        self.n_turned
+    }
+
     fn bytes(&self) -> usize {
-        size_of::<Self>() + self.edit.heap_bytes() + size_of_val(&*self.changes)
+        size_of::<Self>() + self.forward.heap_bytes() + self.backward.heap_bytes()
     }
 }
 
@@ -78,6 +94,15 @@ impl History {
         self.done.back()
     }
 
+    /// All steps in the order they were first done; the first [`Self::n_done`] are in force.
+    pub fn steps(&self) -> impl Iterator<Item = &Step> {
+        self.done.iter().chain(self.undone.iter().rev())
+    }
+
+    pub fn n_done(&self) -> usize {
+        self.done.len()
+    }
+
     pub fn last_done(&self) -> Option<&Step> {
         self.done.back()
     }
@@ -101,23 +126,25 @@ mod tests {
     use super::*;
 
     fn step(n_points: u32) -> Step {
-        let changes = (0..n_points)
-            .map(|point| SourceChange {
-                point,
-                before: None,
-                after: None,
-            })
-            .collect();
+        let forward = StateChange {
+            sources: (0..n_points).map(|point| (point, None)).collect(),
+            ..StateChange::default()
+        };
         Step {
-            edit: Edit::Mend(n_points),
-            changes,
-            revision_before: 0,
-            revision_after: 1,
+            kind: EditKind::Mend,
+            backward: forward.clone(),
+            forward,
+            n_turned: 0,
+            revisions: Default::default(),
         }
     }
 
     fn done(history: &History) -> Vec<u32> {
-        history.done.iter().map(|step| step.changes.len() as u32).collect()
+        history
+            .done
+            .iter()
+            .map(|step| step.forward.sources.len() as u32)
+            .collect()
     }
 
     #[test]
@@ -140,9 +167,9 @@ mod tests {
         let mut history = History::new(usize::MAX);
         (1..=3).for_each(|n| history.record(step(n)));
         let bytes = history.bytes;
-        assert_eq!(history.undo().map(|step| step.changes.len()), Some(3));
-        assert_eq!(history.undo().map(|step| step.changes.len()), Some(2));
-        assert_eq!(history.redo().map(|step| step.changes.len()), Some(2));
+        assert_eq!(history.undo().map(|step| step.forward.sources.len()), Some(3));
+        assert_eq!(history.undo().map(|step| step.forward.sources.len()), Some(2));
+        assert_eq!(history.redo().map(|step| step.forward.sources.len()), Some(2));
         assert_eq!(history.bytes, bytes);
         history.record(step(4));
         assert!(history.redo().is_none());

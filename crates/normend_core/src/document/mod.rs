@@ -1,14 +1,13 @@
-//! The document: cloud, parameters, sources, and their history. [`Document::apply`] is the only way to change its
-//! sources.
+//! The document: cloud, state, and its history. [`Document::apply`] is the only way to change the state.
 //!
-//! Ground state are the cloud and the sources; the [`Propagation`] is computed elsewhere and installed, and the signs
-//! follow from both.
+//! Ground are the cloud and the [`State`]: sources, marks, selection, parameters. The [`Propagation`] is computed elsewhere and
+//! installed, and the signs follow from all of them.
 //!
-//! Invariants: with a propagation, each source's point has the sign that the source vouches for; a failed edit changes
-//! nothing; undo restores every bit.
+//! Invariants: with a propagation, the region of each source has the sign that the source vouches for, and each marked point
+//! shows its mark; a failed edit changes nothing; undo restores every bit.
 //! Not here: how signs follow from sources is [`crate::regions`]; jobs and files belong to the editor.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -16,42 +15,57 @@ use rayon::prelude::*;
 
 use crate::patches::{Offer, Patch};
 use crate::sources::{Origin, SourcePatch};
-use crate::{Change, Orientation, Parameters, PointCloud, Propagation, Regions, Source, Sources};
+use crate::{Change, Orientation, Parameters, PointCloud, PointSet, Propagation, Regions, Source, Sources};
 
+mod changes;
 mod edit;
 mod history;
+mod marks;
+mod spread;
+mod state;
 mod turned_patches;
+mod viewer;
 
 #[cfg(test)]
 mod patch_tests;
+#[cfg(test)]
+mod state_tests;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
 mod voted_tests;
 
-pub use edit::{Edit, EditError};
-use history::{History, SourceChange, Step};
+pub use edit::{Edit, EditError, EditKind, FlipReason};
+pub use history::Step;
+use history::{History, Revisions};
+use marks::Overlay;
+pub use marks::{Mark, Marks};
+pub use state::{State, StateChange};
 use turned_patches::TurnedPatches;
+pub use viewer::Viewer;
 
-/// A cloud with its sources, and everything derived from them.
+/// A cloud with its state, and everything derived from them.
 #[derive(Debug)]
 pub struct Document {
     cloud: Arc<PointCloud>,
     given: Option<Arc<Vec<Vec3>>>,
-    sources: Sources,
+    state: State,
     derived: Option<Derived>,
     history: History,
-    revision: u64,
+    revisions: Revisions,
     n_revisions: u64,
 }
 
-/// What follows from the cloud, the parameters and the sources.
-#[derive(Debug)]
+/// What follows from the cloud and the state.
+#[derive(Clone, Debug)]
 struct Derived {
-    propagation: Propagation,
+    propagation: Arc<Propagation>,
+    /// The signs by sources and patches.
     regions: Regions,
     /// `None` without patches.
     turned: Option<TurnedPatches>,
+    /// The marks over the signs of the regions.
+    overlay: Overlay,
 }
 
 impl Derived {
@@ -62,7 +76,9 @@ impl Derived {
             propagation,
             regions,
             turned,
+            overlay: _,
         } = self;
+        let propagation = &*propagation;
         let patches = turned.as_mut().map_or_else(Change::default, |turned| {
             turned.set(
                 sources.iter().copied(),
@@ -93,7 +109,7 @@ impl Derived {
             .and_then(|source| source.opposite_amid_opposite().patch);
         Source {
             point,
-            normal: -self.oriented_normal(point),
+            normal: -self.region_normal(point),
             origin: Origin::Picked,
             patch,
         }
@@ -110,7 +126,7 @@ impl Derived {
     }
 
     /// An existing point as the source that turns a patch around it.
-    fn patch_source(&self, point: u32, n_points: u32) -> Result<Source, EditError> {
+    fn patch_source(&self, point: u32, n_points: u32, origin: Origin) -> Result<Source, EditError> {
         let (turned, patch) = self.patch_to_turn(point, n_points)?;
         let position = self.propagation.tree.position(point);
         let starts_turned = starts_turned(&self.propagation, point) != turned.turns(patch, point);
@@ -120,8 +136,8 @@ impl Derived {
         };
         Ok(Source {
             point,
-            normal: -self.oriented_normal(point),
-            origin: Origin::Picked,
+            normal: -self.region_normal(point),
+            origin,
             patch: Some(patch),
         })
     }
@@ -130,7 +146,7 @@ impl Derived {
     /// has no source yet.
     fn default_source_beside(&self, point: u32, sources: &Sources) -> Option<u32> {
         let position = self.propagation.tree.position(point);
-        let component = self.propagation.tree.roots().partition_point(|&root| root <= position) - 1;
+        let component = self.propagation.tree.component(position);
         let &default = self.propagation.default_sources.get(component)?;
         // After the first mend the default source is a source itself, which spares the climbs up the tree.
         let is_beside = default != point
@@ -140,15 +156,22 @@ impl Derived {
         is_beside.then_some(default)
     }
 
-    /// The stored normal of an existing point, turned or not.
-    fn oriented_normal(&self, point: u32) -> Vec3 {
-        let stored = self.propagation.normals[point as usize];
+    /// The stored normal of an existing point as its region turns it, whatever its mark says.
+    fn region_normal(&self, point: u32) -> Vec3 {
         let position = self.propagation.tree.position(point);
-        if self.regions.orientation().is_turned(position) {
-            -stored
-        } else {
-            stored
-        }
+        self.normal(point, self.regions.orientation().is_turned(position))
+    }
+
+    /// The stored normal of an existing point as it is shown.
+    fn oriented_normal(&self, point: u32) -> Vec3 {
+        let position = self.propagation.tree.position(point);
+        self.normal(point, self.overlay.shown().is_turned(position))
+    }
+
+    /// The stored normal of an existing point, turned or not.
+    fn normal(&self, point: u32, turned: bool) -> Vec3 {
+        let stored = self.propagation.normals[point as usize];
+        if turned { -stored } else { stored }
     }
 }
 
@@ -173,12 +196,18 @@ impl Document {
         Self {
             cloud,
             given,
-            sources: Sources::default(),
+            state: State::default(),
             derived: None,
             history: History::new(Self::HISTORY_BYTES),
-            revision: 0,
+            revisions: Revisions::default(),
             n_revisions: 1,
         }
+    }
+
+    /// The same document that wants other parameters from the beginning: nothing to undo.
+    pub fn with_parameters(mut self, parameters: Parameters) -> Self {
+        self.state.parameters = parameters;
+        self
     }
 
     /// Sets how many bytes the history may take, [`Self::HISTORY_BYTES`] at first. Past it the oldest edits cannot be
@@ -197,8 +226,8 @@ impl Document {
         self.given.as_ref()
     }
 
-    /// Takes a finished propagation in place of the present one; the sources stay and are applied to it, and so does the
-    /// history. O(n).
+    /// Takes a finished propagation in place of the present one; the state stays and is applied to it, and so does the
+    /// history. The parameters of the propagation are the wanted ones from now on. O(n).
     ///
     /// # Panics
     /// When the propagation is of another number of points than the cloud.
@@ -208,30 +237,73 @@ impl Document {
             self.cloud.n_points(),
             "the propagation is of another cloud"
         );
+        self.state.parameters = propagation.parameters;
         let regions = propagation.base_regions.clone();
         let turned = propagation.patches.clone().map(TurnedPatches::new);
-        let derived = self.derived.insert(Derived {
-            propagation,
+        let overlay = Overlay::new(&regions);
+        let mut derived = Derived {
+            propagation: Arc::new(propagation),
             regions,
             turned,
-        });
-        derived.set(self.sources.iter().map(|&source| (source.point, Some(source))));
+            overlay,
+        };
+        derived.set((self.state.sources.iter()).map(|&source| (source.point, Some(source))));
+        let Derived {
+            propagation,
+            regions,
+            overlay,
+            ..
+        } = &mut derived;
+        *overlay = Overlay::new(regions);
+        let marks = &self.state.marks;
+        overlay.show(
+            propagation,
+            regions,
+            marks,
+            &Change::default(),
+            marks.iter().map(|(point, _)| point),
+        );
+        self.derived = Some(derived);
     }
 
     /// The propagation in force.
     pub fn propagation(&self) -> Option<&Propagation> {
-        self.derived.as_ref().map(|derived| &derived.propagation)
+        self.derived.as_ref().map(|derived| &*derived.propagation)
     }
 
-    /// The parameters in force (the default ones before the first [`Self::install`]).
+    /// The propagation in force, to be shared with other threads.
+    pub fn shared_propagation(&self) -> Option<Arc<Propagation>> {
+        self.derived.as_ref().map(|derived| Arc::clone(&derived.propagation))
+    }
+
+    /// The parameters that are wanted. Those in force are the [`Self::propagation`]'s; where the two differ, a propagation is due.
     pub fn parameters(&self) -> Parameters {
-        self.propagation()
-            .map_or_else(Parameters::default, |propagation| propagation.parameters)
+        self.state.parameters
+    }
+
+    /// All that the user has decided.
+    pub fn state(&self) -> &State {
+        &self.state
     }
 
     /// The sources, by point.
     pub fn sources(&self) -> &Sources {
-        &self.sources
+        &self.state.sources
+    }
+
+    /// The marks, by point.
+    pub fn marks(&self) -> &Marks {
+        &self.state.marks
+    }
+
+    /// The selected points.
+    pub fn selected(&self) -> &PointSet {
+        &self.state.selected
+    }
+
+    /// The points that are not shown.
+    pub fn hidden(&self) -> &PointSet {
+        &self.state.hidden
     }
 
     /// Whether a source is *flipped*: it vouches for the other side than the one its point has without any source. Before
@@ -246,27 +318,54 @@ impl Document {
 
     /// Applies an edit, remembers its inverse, forgets what was undone. Returns what turned.
     ///
-    /// An edit that leaves every source as it is (adding what is there already) is not remembered. Before the first
-    /// [`Self::install`] sources can be set, but not picked, and nothing turns.
+    /// An edit that leaves the state as it is (adding what is there already) is not remembered. Before the first
+    /// [`Self::install`] nothing turns, and what depends on signs is refused.
     ///
     /// # Errors
     /// [`EditError`]; the document is unchanged then.
     pub fn apply(&mut self, edit: Edit) -> Result<Change, EditError> {
-        let changes = self.changes_of(&edit)?;
-        if changes.is_empty() {
-            return Ok(Change::default());
+        let change = self.change_of(&edit)?;
+        Ok(self.perform(edit.kind(), change, true))
+    }
+
+    /// Makes a change of the state that was recorded before, as one step of the history. Returns what turned.
+    ///
+    /// # Errors
+    /// [`EditError`] when the change does not fit the cloud; the document is unchanged then.
+    pub fn apply_recorded(&mut self, kind: EditKind, change: StateChange) -> Result<Change, EditError> {
+        if let Some(point) = change.largest_point() {
+            self.check_point(point)?;
         }
-        let after: Vec<_> = changes.iter().map(|change| (change.point, change.after)).collect();
-        let change = self.set_sources(&after);
-        let revision_before = std::mem::replace(&mut self.revision, self.n_revisions);
+        let sources = change.sources.iter();
+        let sources = sources.filter_map(|(point, source)| Some((*point, source.as_ref()?.normal)));
+        let marks = change.marks.iter();
+        let marks = marks.filter_map(|(point, mark)| Some((*point, mark.as_ref()?.normal)));
+        for (point, normal) in sources.chain(marks) {
+            check_direction(point, normal)?;
+        }
+        Ok(self.perform(kind, change, false))
+    }
+
+    /// Makes a change and remembers it. Where `takes_along`, marked points turn with their regions.
+    fn perform(&mut self, kind: EditKind, mut change: StateChange, takes_along: bool) -> Change {
+        if change.is_empty() {
+            return Change::default();
+        }
+        let before = self.revisions;
+        self.revisions.all = self.n_revisions;
+        if change.is_of_signs() {
+            self.revisions.signs = self.n_revisions;
+        }
         self.n_revisions += 1;
+        let (turned, backward) = make(&mut self.state, self.derived.as_mut(), &mut change, takes_along);
         self.history.record(Step {
-            edit,
-            changes,
-            revision_before,
-            revision_after: self.revision,
+            kind,
+            forward: change,
+            backward,
+            n_turned: turned.n_points(),
+            revisions: [before, self.revisions],
         });
-        Ok(change)
+        turned
     }
 
     /// What `Edit::Mend(point)` would turn, without changing anything.
@@ -274,11 +373,10 @@ impl Document {
     /// # Errors
     /// [`EditError`] as [`Self::apply`].
     pub fn preview_mend(&self, point: u32) -> Result<Change, EditError> {
-        let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
-        self.check_point(point)?;
-        Ok(derived
-            .regions
-            .preview_beside(point, derived.default_source_beside(point, &self.sources)))
+        let derived = self.derived_at(point)?;
+        let beside = derived.default_source_beside(point, &self.state.sources);
+        let region = derived.regions.preview_beside(point, beside);
+        Ok(derived.overlay.without_pinned(region))
     }
 
     /// The patches that a click on `point` can turn, and which by default; `None` where the propagation has no patches or the
@@ -297,10 +395,10 @@ impl Document {
     /// # Errors
     /// [`EditError`] as [`Self::apply`].
     pub fn preview_turn_patch(&self, point: u32, n_points: u32) -> Result<Change, EditError> {
-        let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
-        self.check_point(point)?;
+        let derived = self.derived_at(point)?;
         let (turned, patch) = derived.patch_to_turn(point, n_points)?;
-        Ok(turned.positions(patch, &derived.propagation.tree))
+        let patch = turned.positions(patch, &derived.propagation.tree);
+        Ok(derived.overlay.without_pinned(patch))
     }
 
     /// What `Edit::TurnWhole(point)` would turn, without changing anything.
@@ -308,52 +406,85 @@ impl Document {
     /// # Errors
     /// [`EditError`] as [`Self::apply`].
     pub fn preview_turn_whole(&self, point: u32) -> Result<Change, EditError> {
-        let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
-        self.check_point(point)?;
-        Ok(derived.regions.region_of(point))
+        let derived = self.derived_at(point)?;
+        Ok(derived.overlay.without_pinned(derived.regions.region_of(point)))
     }
 
-    /// Takes the last edit back; `None` when there is none.
+    /// What any edit would turn, without changing anything. O(n / 8) bytes and what the edit costs; clicks have their own previews,
+    /// which are cheaper.
+    ///
+    /// # Errors
+    /// [`EditError`] as [`Self::apply`].
+    pub fn preview(&self, edit: &Edit) -> Result<Change, EditError> {
+        let mut change = self.change_of(edit)?;
+        let (mut state, mut derived) = (self.state.clone(), self.derived.clone());
+        let (turned, _) = make(&mut state, derived.as_mut(), &mut change, true);
+        Ok(turned)
+    }
+
+    /// How many pinned points stay as they are while what is around them turns, by [`Edit::TurnPatch`].
+    ///
+    /// # Errors
+    /// [`EditError`] as [`Self::apply`].
+    pub fn n_pinned_in_patch(&self, point: u32, n_points: u32) -> Result<u64, EditError> {
+        let derived = self.derived_at(point)?;
+        let (turned, patch) = derived.patch_to_turn(point, n_points)?;
+        let patch = turned.positions(patch, &derived.propagation.tree);
+        Ok(derived.overlay.n_pinned_in(&patch))
+    }
+
+    /// Takes the last edit back; `None` when there is none. Returns what turned.
     pub fn undo(&mut self) -> Option<Change> {
         let step = self.history.undo()?;
-        self.revision = step.revision_before;
-        // Backwards, because a cut undone in reverse has the region it made.
-        let before: Vec<_> = step
-            .changes
-            .iter()
-            .rev()
-            .map(|change| (change.point, change.before))
-            .collect();
-        Some(self.set_sources(&before))
+        let [before, _] = step.revisions;
+        let mut change = step.backward.clone();
+        self.revisions = before;
+        Some(make(&mut self.state, self.derived.as_mut(), &mut change, false).0)
     }
 
-    /// Applies the last undone edit again; `None` when there is none.
+    /// Applies the last undone edit again; `None` when there is none. Returns what turned.
     pub fn redo(&mut self) -> Option<Change> {
         let step = self.history.redo()?;
-        self.revision = step.revision_after;
-        let after: Vec<_> = step.changes.iter().map(|change| (change.point, change.after)).collect();
-        Some(self.set_sources(&after))
+        let [_, after] = step.revisions;
+        let mut change = step.forward.clone();
+        self.revisions = after;
+        Some(make(&mut self.state, self.derived.as_mut(), &mut change, false).0)
     }
 
-    /// The edit that [`Self::undo`] would take back.
-    pub fn next_undo(&self) -> Option<&Edit> {
-        self.history.last_done().map(|step| &step.edit)
+    /// The step that [`Self::undo`] would take back.
+    pub fn next_undo(&self) -> Option<&Step> {
+        self.history.last_done()
     }
 
-    /// The edit that [`Self::redo`] would apply.
-    pub fn next_redo(&self) -> Option<&Edit> {
-        self.history.last_undone().map(|step| &step.edit)
+    /// The step that [`Self::redo`] would apply.
+    pub fn next_redo(&self) -> Option<&Step> {
+        self.history.last_undone()
     }
 
-    /// A number that names the state of the sources: equal numbers, equal sources. Undo returns to the number of
-    /// before; so "unsaved" is `revision() != revision_at_last_export`.
+    /// All steps that are remembered, in the order they were done, undone ones last; the first [`Self::n_done`] are in force.
+    pub fn steps(&self) -> impl Iterator<Item = &Step> {
+        self.history.steps()
+    }
+
+    /// How many of the [`Self::steps`] are in force.
+    pub fn n_done(&self) -> usize {
+        self.history.n_done()
+    }
+
+    /// A number that names the state: equal numbers, equal states. Undo returns to the number of before.
     pub fn revision(&self) -> u64 {
-        self.revision
+        self.revisions.all
+    }
+
+    /// A number that names what signs depend on, which selecting and hiding do not change; so "unsaved" is
+    /// `signs_revision() != signs_revision_at_last_export`.
+    pub fn signs_revision(&self) -> u64 {
+        self.revisions.signs
     }
 
     /// The signs, by preorder position; `None` before the first [`Self::install`].
     pub fn orientation(&self) -> Option<&Orientation> {
-        self.derived.as_ref().map(|derived| derived.regions.orientation())
+        self.derived.as_ref().map(|derived| derived.overlay.shown())
     }
 
     /// The oriented normal of one point; `None` before the first [`Self::install`] or past the end of the cloud.
@@ -386,92 +517,64 @@ impl Document {
     /// The source at an existing point.
     fn source(&self, point: u32) -> Result<Source, EditError> {
         self.check_point(point)?;
-        self.sources.get(point).copied().ok_or(EditError::NotASource { point })
+        self.state
+            .sources
+            .get(point)
+            .copied()
+            .ok_or(EditError::NotASource { point })
     }
 
-    /// What an edit does to the sources, one entry for each point that changes, ascending by point.
-    fn changes_of(&self, edit: &Edit) -> Result<Box<[SourceChange]>, EditError> {
-        let change = |point, after| SourceChange {
-            point,
-            before: self.sources.get(point).copied(),
-            after,
-        };
-        Ok(match edit {
-            &Edit::Mend(point) => {
-                let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
-                self.check_point(point)?;
-                let mut changes = vec![change(point, Some(derived.mended(point, &self.sources)))];
-                if let Some(default) = derived.default_source_beside(point, &self.sources) {
-                    let normal = derived.oriented_normal(default);
-                    let source = Source {
-                        point: default,
-                        normal,
-                        origin: Origin::Default,
-                        patch: None,
-                    };
-                    changes.push(change(default, Some(source)));
-                    changes.sort_unstable_by_key(|change| change.point);
-                }
-                changes.into()
-            }
-            &Edit::TurnPatch { point, n_points } => {
-                let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
-                self.check_point(point)?;
-                Box::new([change(point, Some(derived.patch_source(point, n_points)?))])
-            }
-            &Edit::TurnWhole(point) => {
-                let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
-                self.check_point(point)?;
-                let source = match derived.regions.source_of(point) {
-                    Some(source) => match self.sources.get(source) {
-                        Some(source) => source.opposite_amid_opposite(),
-                        // A voted source is overruled where it stands.
-                        None => derived.mended(source, &self.sources),
-                    },
-                    None => derived.mended(point, &self.sources),
-                };
-                Box::new([change(source.point, Some(source))])
-            }
-            Edit::AddSources(sources) => {
-                let mut after = BTreeMap::new();
-                for source in sources {
-                    let point = source.point;
-                    self.check_point(point)?;
-                    if !source.normal.is_finite() || source.normal == Vec3::ZERO {
-                        return Err(EditError::NoDirection { point });
-                    }
-                    after.insert(point, *source);
-                }
-                after.retain(|&point, source| self.sources.get(point) != Some(source));
-                after
-                    .into_iter()
-                    .map(|(point, source)| change(point, Some(source)))
-                    .collect()
-            }
-            Edit::RemoveSources(points) => {
-                points.iter().try_for_each(|&point| self.source(point).map(drop))?;
-                BTreeSet::from_iter(points)
-                    .into_iter()
-                    .map(|&point| change(point, None))
-                    .collect()
-            }
-            Edit::FlipSources(points) => BTreeSet::from_iter(points)
-                .into_iter()
-                .map(|&point| Ok(change(point, Some(self.source(point)?.opposite()))))
-                .collect::<Result<_, _>>()?,
-        })
-    }
-
-    /// Sets the source at each point to what is given and turns what follows from it.
-    fn set_sources(&mut self, sources: &[(u32, Option<Source>)]) -> Change {
-        for &(point, source) in sources {
-            match source {
-                Some(source) => self.sources.insert(source),
-                None => self.sources.remove(point),
-            };
+    /// What is derived, for an edit that a click on `point` makes.
+    fn derived_at(&self, point: u32) -> Result<&Derived, EditError> {
+        let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
+        self.check_point(point)?;
+        if self.state.marks.is_pinned(point) {
+            return Err(EditError::Pinned { n_pinned: 1 });
         }
-        self.derived
-            .as_mut()
-            .map_or_else(Change::default, |derived| derived.set(sources.iter().copied()))
+        Ok(derived)
+    }
+
+    fn check_points(&self, points: &PointSet) -> Result<(), EditError> {
+        points.max().map_or(Ok(()), |point| self.check_point(point))
+    }
+}
+
+/// Makes a change of the state and of what is derived from it. Returns what turned, and the change that takes it back. Where
+/// `takes_along`, the marked points of regions that turn are added to the change, unless they are pinned or it names them itself.
+fn make(
+    state: &mut State,
+    derived: Option<&mut Derived>,
+    change: &mut StateChange,
+    takes_along: bool,
+) -> (Change, StateChange) {
+    let Some(derived) = derived else {
+        return (Change::default(), state.change(change));
+    };
+    let turned = derived.set(change.sources.iter().copied());
+    if takes_along {
+        let named: BTreeSet<u32> = change.marks.iter().map(|&(point, _)| point).collect();
+        let along = derived.overlay.along(&turned).into_iter();
+        let along = along.map(|position| derived.propagation.tree.order()[position as usize]);
+        let along = along.filter(|point| !named.contains(point));
+        let along = along.map(|point| (point, state.marks.get(point).map(|mark| mark.opposite())));
+        change.marks.extend(along);
+    }
+    let backward = state.change(change);
+    let marked = change.marks.iter().map(|&(point, _)| point);
+    let Derived {
+        propagation,
+        regions,
+        overlay,
+        ..
+    } = derived;
+    let shown = overlay.show(propagation, regions, &state.marks, &turned, marked);
+    (shown, backward)
+}
+
+fn check_direction(point: u32, normal: Vec3) -> Result<(), EditError> {
+    if normal.is_finite() && normal != Vec3::ZERO {
+        Ok(())
+    } else {
+        Err(EditError::NoDirection { point })
     }
 }

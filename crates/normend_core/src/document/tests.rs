@@ -114,6 +114,8 @@ fn expect(document: &Document, world: &World) -> FixedBitSet {
         .collect();
     let mut bits = FixedBitSet::with_capacity(world.n_points);
     for (point, (turned, _)) in world.expect(&sources).into_iter().enumerate() {
+        let mark = document.marks().get(point as u32);
+        let turned = mark.map_or(turned, |mark| mark.turns(normals[point]));
         bits.set(world.tree.position(point as u32) as usize, turned);
     }
     bits
@@ -129,6 +131,16 @@ enum Act {
     /// Some of the sources, each perhaps twice.
     Remove(Vec<Index>),
     Flip(Vec<Index>),
+    FlipPoints(Vec<u32>),
+    Pin(Vec<u32>),
+    Unpin(Vec<u32>),
+    PropagateFrom(Vec<u32>),
+    PropagateInside(Vec<u32>),
+    Select(Vec<u32>),
+    Hide(Vec<u32>),
+    Accept(Vec<u32>),
+    SetParameters(usize),
+    SetViewpoints(Vec<u32>),
     Undo,
     Redo,
     /// The other world with other normals.
@@ -143,7 +155,18 @@ fn acts(n_points: usize, most: usize) -> impl Strategy<Value = Vec<Act>> {
         1 => (0..n_points as u32, any::<bool>())
             .prop_map(|(n_points, amid_mended)| Some(SourcePatch { n_points, amid_mended })),
     ];
+    let set = || prop::collection::vec(0..n_points as u32, 0..6);
     let act = prop_oneof![
+        2 => set().prop_map(Act::FlipPoints),
+        1 => set().prop_map(Act::Pin),
+        1 => set().prop_map(Act::Unpin),
+        1 => set().prop_map(Act::PropagateFrom),
+        1 => set().prop_map(Act::PropagateInside),
+        1 => set().prop_map(Act::Select),
+        1 => set().prop_map(Act::Hide),
+        1 => set().prop_map(Act::Accept),
+        1 => (4_usize..9).prop_map(Act::SetParameters),
+        1 => set().prop_map(Act::SetViewpoints),
         4 => points.clone().prop_map(Act::Mend),
         1 => points.clone().prop_map(Act::TurnWhole),
         4 => (points.clone(), 0..n_points as u32 / 2 + 2).prop_map(|(point, n_points)| Act::TurnPatch(point, n_points)),
@@ -198,6 +221,24 @@ fn edit_of(act: &Act, document: &Document) -> Option<Edit> {
         )),
         Act::Remove(chosen) => Some(Edit::RemoveSources(some_of(chosen))),
         Act::Flip(chosen) => Some(Edit::FlipSources(some_of(chosen))),
+        Act::FlipPoints(points) => Some(Edit::FlipPoints {
+            points: points.iter().collect(),
+            reason: FlipReason::Asked,
+        }),
+        Act::Pin(points) => Some(Edit::Pin(points.iter().collect())),
+        Act::Unpin(points) => Some(Edit::Unpin(points.iter().collect())),
+        Act::PropagateFrom(points) => Some(Edit::PropagateFrom(points.iter().collect())),
+        Act::PropagateInside(points) => Some(Edit::PropagateInside(points.iter().collect())),
+        Act::Select(points) => Some(Edit::Select(points.iter().collect())),
+        Act::Hide(points) => Some(Edit::Hide(points.iter().collect())),
+        Act::Accept(points) => Some(Edit::Accept(points.iter().collect())),
+        &Act::SetParameters(k_graph) => Some(Edit::SetParameters(Parameters {
+            k_graph,
+            ..Parameters::default()
+        })),
+        Act::SetViewpoints(places) => Some(Edit::SetViewpoints(
+            places.iter().map(|&place| Vec3::X * place as f32).collect(),
+        )),
         Act::Undo | Act::Redo | Act::Install => None,
     }
 }
@@ -217,35 +258,70 @@ fn check_session(worlds: &[Setting; 2], acts: Vec<Act>) -> Result<(), TestCaseEr
     let mut document = document_of(worlds[0].0.n_points);
     let mut installed = 0;
     document.install(propagation_in(&worlds[0]));
-    // Sources and revision after each edit that can be undone or redone, and which of these states holds.
-    let mut states = vec![(document.sources().clone(), document.revision())];
+    // State and revisions after each edit that can be undone or redone, and which of these states holds.
+    let state_of = |document: &Document| (document.state().clone(), document.revision(), document.signs_revision());
+    let mut states = vec![state_of(&document)];
     let mut present = 0;
     for act in acts {
         let before = document.orientation().unwrap().bits().clone();
+        let pinned: Vec<_> = (document.marks().iter().filter(|(_, mark)| mark.pinned))
+            .map(|(point, _)| (point, document.oriented_normal(point)))
+            .collect();
         let mut change = Change::default();
         match (edit_of(&act, &document), &act) {
             (Some(edit), _) => {
-                let preview = match edit {
-                    Edit::TurnPatch { point, n_points } => {
-                        let preview = document.preview_turn_patch(point, n_points);
-                        if let Err(refused) = preview {
-                            prop_assert_eq!(document.apply(edit), Err(refused));
-                            continue;
-                        }
-                        preview.ok()
-                    }
-                    Edit::Mend(point) => Some(document.preview_mend(point).unwrap()),
-                    Edit::TurnWhole(point) => Some(document.preview_turn_whole(point).unwrap()),
+                let click = match edit {
+                    Edit::TurnPatch { point, n_points } => Some(document.preview_turn_patch(point, n_points)),
+                    Edit::Mend(point) => Some(document.preview_mend(point)),
+                    Edit::TurnWhole(point) => Some(document.preview_turn_whole(point)),
                     _ => None,
                 };
-                change = document.apply(edit).unwrap();
-                prop_assert!(preview.is_none_or(|preview| preview == change && !change.is_empty()));
-                if document.sources() == &states[present].0 {
+                let preview = document.preview(&edit);
+                let applied = document.apply(edit.clone());
+                prop_assert_eq!(&preview, &applied);
+                if let Some(click) = click {
+                    prop_assert_eq!(&click, &applied);
+                    prop_assert!(
+                        applied.as_ref().is_ok_and(|change| !change.is_empty())
+                            || !pinned.is_empty()
+                            || applied.is_err()
+                    );
+                }
+                let Ok(applied) = applied else {
+                    prop_assert_eq!(state_of(&document), states[present].clone());
+                    continue;
+                };
+                change = applied;
+                if !matches!(edit, Edit::Unpin(_)) {
+                    for (point, normal) in pinned {
+                        prop_assert_eq!(document.oriented_normal(point), normal, "a pin turned");
+                    }
+                }
+                if let Edit::FlipPoints { points, .. } = &edit {
+                    let free = points
+                        .iter()
+                        .filter(|&point| !document.marks().is_pinned(point))
+                        .count();
+                    prop_assert_eq!(change.n_points(), free as u64);
+                }
+                if let Edit::Pin(_)
+                | Edit::Unpin(_)
+                | Edit::Select(_)
+                | Edit::Hide(_)
+                | Edit::Accept(_)
+                | Edit::SetParameters(_) = edit
+                {
                     prop_assert!(change.is_empty());
-                } else {
+                }
+                if document.state() == &states[present].0 {
+                    // An edit may come out as nothing, but what changes nothing is no step.
+                    let step = document.next_undo().map(|step| step.change().is_empty());
+                    prop_assert!(step != Some(true));
+                }
+                if document.revision() != states[present].1 {
                     states.truncate(present + 1);
-                    prop_assert!(states.iter().all(|(_, revision)| *revision != document.revision()));
-                    states.push((document.sources().clone(), document.revision()));
+                    prop_assert!(states.iter().all(|(_, revision, _)| *revision != document.revision()));
+                    states.push(state_of(&document));
                     present += 1;
                 }
             }
@@ -263,27 +339,56 @@ fn check_session(worlds: &[Setting; 2], acts: Vec<Act>) -> Result<(), TestCaseEr
             }
             (None, _) => {
                 installed = 1 - installed;
-                document.install(propagation_in(&worlds[installed]));
+                let wanted = document.parameters();
+                document.install(Propagation {
+                    parameters: wanted,
+                    ..propagation_in(&worlds[installed])
+                });
             }
         }
         if !matches!(act, Act::Install) {
             prop_assert_eq!(turned(&document, &change), before);
         }
-        prop_assert_eq!(
-            (document.sources(), document.revision()),
-            (&states[present].0, states[present].1)
-        );
+        prop_assert_eq!(&state_of(&document), &states[present]);
         prop_assert_eq!(document.next_undo().is_some(), present > 0);
+        prop_assert_eq!(
+            (document.n_done(), document.steps().count()),
+            (present, states.len() - 1)
+        );
         prop_assert_eq!(document.next_redo().is_some(), present + 1 < states.len());
         prop_assert_eq!(
             document.orientation().unwrap().bits(),
             &expect(&document, &worlds[installed].0)
         );
-        for source in document.sources().iter() {
+        for (point, mark) in document.marks().iter() {
+            let shown = document.oriented_normal(point).unwrap();
+            prop_assert!(!mark.turns(shown) || mark.normal.dot(shown) == 0.0);
+        }
+        for source in document
+            .sources()
+            .iter()
+            .filter(|source| document.marks().get(source.point).is_none())
+        {
             let shown = document.oriented_normal(source.point).unwrap();
             prop_assert!(!source.turns(shown) || source.normal.dot(shown) == 0.0);
         }
+        check_recorded(&document, &worlds[installed])?;
     }
+    Ok(())
+}
+
+/// The recorded steps make the same state and signs again on another document.
+fn check_recorded(document: &Document, world: &Setting) -> Result<(), TestCaseError> {
+    let mut again = document_of(world.0.n_points);
+    for step in document.steps().take(document.n_done()) {
+        again.apply_recorded(step.kind(), step.change().clone()).unwrap();
+    }
+    again.install(Propagation {
+        parameters: again.parameters(),
+        ..propagation_in(world)
+    });
+    prop_assert_eq!(again.state(), document.state());
+    prop_assert_eq!(again.orientation(), document.orientation());
     Ok(())
 }
 
@@ -434,7 +539,7 @@ fn a_failed_edit_changes_nothing() {
         document.apply(Edit::Mend(4)).unwrap();
         document.undo();
         let state = |document: &Document| {
-            let edits = (document.next_undo().cloned(), document.next_redo().cloned());
+            let edits = [document.next_undo(), document.next_redo()].map(|step| step.map(Step::kind));
             (
                 document.sources().clone(),
                 document.revision(),
@@ -465,8 +570,11 @@ fn an_edit_that_changes_no_source_is_not_remembered() {
         assert!(document.apply(edit).unwrap().is_empty());
     }
     assert_eq!(
-        (document.next_undo(), document.next_redo()),
-        (Some(&Edit::Mend(1)), Some(&Edit::Mend(3)))
+        (
+            document.next_undo().map(Step::kind),
+            document.next_redo().map(Step::kind)
+        ),
+        ([EditKind::Mend; 2].map(Some)).into()
     );
     assert_eq!(document.revision(), revision);
 }

@@ -13,7 +13,7 @@ use crate::patches::{Offer, Patch};
 use crate::{Change, Patches, Source, SpanningTree};
 
 /// The patches of the sources, and which of them are turned.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct TurnedPatches {
     patches: Arc<Patches>,
     /// The sources by the leaf of their point.

@@ -107,6 +107,13 @@ impl Regions {
         self.initial_tops.count_ones(..)
     }
 
+    /// The tops of the base regions among the positions of `range`, ascending. O(regions in it).
+    pub fn base_tops(&self, range: Range<u32>) -> impl Iterator<Item = u32> {
+        let next = move |from: u32| self.tops.next(from).filter(|&top| top < range.end);
+        let tops = std::iter::successors(next(range.start), move |&top| next(top + 1));
+        tops.filter(|&top| self.initial_tops.contains(top as usize))
+    }
+
     /// Number of regions: each has a source, or is a base region without one. O(n / 64).
     pub fn n_regions(&self) -> usize {
         self.tops.len()
