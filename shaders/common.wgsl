@@ -2,6 +2,12 @@
 
 const ID_NONE: u32 = 0u;
 const ID_SPHERE: u32 = 0x80000000u;
+// Planes of bits in flags.
+const FLAG_TURNED: u32 = 0u;
+const FLAG_SELECTED: u32 = 1u;
+const FLAG_HIDDEN: u32 = 2u;
+const FLAG_COMPARED: u32 = 3u;
+const FLAG_WRONG: u32 = 4u;
 const OCT_MAX: f32 = 2046.0;
 const NO_NORMAL: u32 = 2047u;
 const NORMAL_BITS: u32 = 0x3fffffu;
@@ -25,11 +31,41 @@ struct Frame {
     sphere_radius: f32,
     line_width: f32,
     stride: u32,
+    clip_min: vec3<f32>,
+    near_depth: f32,
+    clip_max: vec3<f32>,
+    plane_words: u32,
+    section: vec3<f32>,
+    section_offset: f32,
+    origin: vec2<f32>,
+    whole: vec2<f32>,
+    section_half: f32,
+    ball_radius: f32,
+    pad_0: u32,
+    pad_1: u32,
 }
 
-struct Point {
-    position: vec3<f32>,
-    packed: u32,
+struct Look {
+    front: vec3<f32>,
+    mode: u32,
+    back: vec3<f32>,
+    n_highlights: u32,
+    background: vec3<f32>,
+    transparent: u32,
+    highlight: vec3<f32>,
+    eye_dome: f32,
+    selected: vec3<f32>,
+    dim_unselected: f32,
+    surface: vec3<f32>,
+    split: f32,
+    wrong: vec3<f32>,
+    has_colors: u32,
+    hair: vec3<f32>,
+    hair_len: f32,
+    hair_every: u32,
+    hair_in_pixels: u32,
+    hair_by_side: u32,
+    pad_0: u32,
 }
 
 struct SphereMark {
@@ -48,6 +84,32 @@ struct Seen {
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> spheres: array<SphereMark>;
+// One bit per instance in each plane.
+@group(0) @binding(2) var<storage, read> flags: array<u32>;
+@group(0) @binding(3) var<uniform> look: Look;
+
+fn has_flag(plane: u32, instance: u32) -> bool {
+    return ((flags[plane * frame.plane_words + instance / 32u] >> (instance % 32u)) & 1u) != 0u;
+}
+
+// The plane of the signs that a pixel column of what is drawn at once shows.
+fn sign_plane(x: f32) -> u32 {
+    return select(FLAG_TURNED, FLAG_COMPARED, frame.origin.x + x < look.split);
+}
+
+// Whether a place is cut away: its world position, the same from the eye, its depth.
+fn is_clipped(position: vec3<f32>, from_eye: vec3<f32>, depth: f32) -> bool {
+    return depth < frame.near_depth
+        || any(position < frame.clip_min)
+        || any(position > frame.clip_max)
+        || abs(dot(from_eye, frame.section) - frame.section_offset) > frame.section_half;
+}
+
+// World length of a pixel at a depth.
+fn pixel_len_at(depth: f32) -> f32 {
+    return frame.pixel_len * select(1.0, depth, frame.perspective > 0.5);
+}
 
 fn has_normal(packed: u32) -> bool {
     return (packed & NO_NORMAL) != NO_NORMAL;

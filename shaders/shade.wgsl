@@ -1,6 +1,21 @@
 // Shade pass: what is seen at each pixel becomes a color. Colors are gamma-encoded, as displayed.
 
-const MODE_NORMALS: u32 = 1u;
+const MODE_LIT: u32 = 1u;
+const MODE_NORMALS: u32 = 2u;
+const MODE_COLORS: u32 = 3u;
+
+// The light of lit surfaces comes from above and to the left of the eye, as illustrators set it; in right, up, back.
+const LIGHT: vec3<f32> = vec3<f32>(-0.35, 0.5, 0.79);
+// What a lit surface shows where no light falls, and how much darker its back is: told apart at once, its shape kept.
+const AMBIENT: f32 = 0.3;
+const LIT_BACK: f32 = 0.16;
+
+// Stripes on what is selected, so that it can be told without seeing its color: their distance in widths of a line, the
+// share of the width that they take, and how much of the selection's color is on them and between.
+const STRIPE_STEP: f32 = 7.0;
+const STRIPE_SHARE: f32 = 0.4;
+const STRIPE_TINT: f32 = 0.7;
+const SELECTED_TINT: f32 = 0.35;
 
 // Splats are edge-on below this cosine between normal and direction to the eye.
 const EDGE_ON: f32 = 0.2;
@@ -15,33 +30,27 @@ const HIDDEN_LEAST: f32 = 0.5;
 const HIDDEN_MOST: f32 = 8.0;
 const HIDDEN_STEP: f32 = 1.0;
 
-// Darkness of creases and of what lies behind an edge.
-const CREASE_STRENGTH: f32 = 60.0;
+// Color and opacity of the line between compared and present signs.
+const SPLIT_COLOR: vec3<f32> = vec3<f32>(0.5);
+const SPLIT_OPACITY: f32 = 0.8;
+
+// Most darkness of creases and of what lies behind an edge.
+const CREASE_STRENGTH: f32 = 120.0;
 const CREASE_LIMIT: f32 = 0.006;
 // Steps between the discs of one surface are no creases: up to so many lengths of a pixel, for each pixel to the center
 // of the disc and beyond that.
 const ROUGHNESS: f32 = 0.6;
 const ROUGHNESS_STEP: f32 = 1.0;
 
-struct Look {
-    front: vec3<f32>,
-    mode: u32,
-    back: vec3<f32>,
-    n_highlights: u32,
-    background: vec3<f32>,
-    pad_0: u32,
-    highlight: vec3<f32>,
-    pad_1: u32,
-}
-
-@group(0) @binding(1) var<storage, read> spheres: array<SphereMark>;
-@group(1) @binding(0) var<uniform> look: Look;
-// One bit per instance: turned or not.
-@group(1) @binding(1) var<storage, read> turned: array<u32>;
 // First and end of each highlighted range, ascending.
-@group(1) @binding(2) var<storage, read> highlights: array<vec2<u32>>;
-@group(1) @binding(3) var seen: texture_2d<u32>;
-@group(1) @binding(4) var surfaces: texture_2d<u32>;
+@group(1) @binding(0) var<storage, read> highlights: array<vec2<u32>>;
+// RGBA8 per instance, when there are colors.
+@group(1) @binding(1) var<storage, read> colors: array<u32>;
+@group(1) @binding(2) var seen: texture_2d<u32>;
+@group(1) @binding(3) var surfaces: texture_2d<u32>;
+
+// The plane of signs that the pixel being shaded shows.
+var<private> signs: u32;
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
@@ -73,18 +82,17 @@ fn is_highlighted(id: u32) -> bool {
 }
 
 fn is_turned(instance: u32) -> bool {
-    return ((turned[instance / 32u] >> (instance % 32u)) & 1u) != 0u;
+    return has_flag(signs, instance);
+}
+
+fn is_selected(id: u32) -> bool {
+    return is_splat(id) && has_flag(FLAG_SELECTED, id - 1u);
 }
 
 fn depth_of(bits: u32) -> f32 {
     let z = bitcast<f32>(bits);
     let a = frame.depth_from_clip;
     return (a.x + a.y * z) / (a.z + a.w * z);
-}
-
-// World length of a pixel at a depth.
-fn pixel_len_at(depth: f32) -> f32 {
-    return frame.pixel_len * select(1.0, depth, frame.perspective > 0.5);
 }
 
 struct Ray {
@@ -96,7 +104,7 @@ struct Ray {
 
 // The line of sight through the middle of a pixel.
 fn ray(pixel: vec2<i32>) -> Ray {
-    let from_center = (vec2<f32>(pixel) + 0.5 - 0.5 * frame.size) * frame.pixel_len;
+    let from_center = (vec2<f32>(pixel) + 0.5 + frame.origin - 0.5 * frame.whole) * frame.pixel_len;
     let up = cross(frame.back, frame.right);
     let across = frame.right * from_center.x - up * from_center.y;
     if frame.perspective > 0.5 {
@@ -127,7 +135,7 @@ fn crease(here: f32, rough: f32, a: vec2<u32>, b: vec2<u32>) -> f32 {
 }
 
 fn background(y: f32) -> vec3<f32> {
-    return look.background * mix(1.0, 0.92, y / frame.size.y);
+    return look.background * mix(1.0, 0.92, (frame.origin.y + y) / frame.whole.y);
 }
 
 fn sphere_color(id: u32, surface: u32) -> vec3<f32> {
@@ -222,29 +230,49 @@ fn is_front(pixel: vec2<i32>, id: u32, surface: vec2<u32>, depth: f32) -> bool {
     return own + horizontal + vertical > 0.0;
 }
 
-fn splat_color(pixel: vec2<i32>, id: u32, surface: vec2<u32>, depth: f32) -> vec3<f32> {
-    if !has_normal(surface.x) {
-        let far = (depth - frame.scene_depth.x) / max(frame.scene_depth.y - frame.scene_depth.x, 1e-30);
-        return vec3<f32>(mix(0.86, 0.42, clamp(far, 0.0, 1.0)));
-    }
-    if look.mode == MODE_NORMALS {
-        let normal = unpack_normal(surface.x & NORMAL_BITS);
-        return select(normal, -normal, is_turned(id - 1u)) * 0.5 + 0.5;
-    }
-    let headlight = mix(0.4, 1.0, f32((surface.x >> 22u) & 511u) / 511.0);
-    return select(look.back, look.front, is_front(pixel, id, surface, depth)) * headlight;
+// Light on the visible side of a surface.
+fn lit(normal: vec3<f32>, cosine: f32) -> f32 {
+    let up = cross(frame.back, frame.right);
+    let light = frame.right * LIGHT.x + up * LIGHT.y + frame.back * LIGHT.z;
+    let toward_eye = select(-normal, normal, cosine >= 0.0);
+    return mix(AMBIENT, 1.0, max(dot(toward_eye, light), 0.0));
 }
 
-@fragment
-fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
-    let pixel = vec2<i32>(position.xy);
-    let here = textureLoad(seen, pixel, 0).xy;
-    if here.x == ID_NONE {
-        return vec4<f32>(background(position.y), 1.0);
+fn splat_color(pixel: vec2<i32>, id: u32, surface: vec2<u32>, depth: f32) -> vec3<f32> {
+    let far = (depth - frame.scene_depth.x) / max(frame.scene_depth.y - frame.scene_depth.x, 1e-30);
+    let is_known = has_normal(surface.x);
+    let headlight = f32((surface.x >> 22u) & 511u) / 511.0;
+    if look.mode == MODE_COLORS && look.has_colors != 0u {
+        let color = unpack4x8unorm(colors[id - 1u]);
+        let light = select(mix(1.0, 0.7, clamp(far, 0.0, 1.0)), mix(0.6, 1.0, headlight), is_known);
+        return mix(look.surface, color.rgb, color.a) * light;
     }
+    if !is_known {
+        return vec3<f32>(mix(0.86, 0.42, clamp(far, 0.0, 1.0)));
+    }
+    let normal = unpack_normal(surface.x & NORMAL_BITS);
+    if look.mode == MODE_NORMALS {
+        return select(normal, -normal, is_turned(id - 1u)) * 0.5 + 0.5;
+    }
+    let front = is_front(pixel, id, surface, depth);
+    if look.mode == MODE_LIT || look.mode == MODE_COLORS {
+        let cosine = select(1.0, -1.0, (surface.x >> 31u) != 0u);
+        return look.surface * lit(normal, cosine) * select(LIT_BACK, 1.0, front);
+    }
+    return select(look.back, look.front, front) * mix(0.4, 1.0, headlight);
+}
+
+// A small ball, `r` radii from its middle, with a light rim that sets it off from what has its color.
+fn ball_color(r: f32) -> vec3<f32> {
+    let light = mix(0.7, 1.0, sqrt(max(1.0 - r * r, 0.0)));
+    return mix(look.wrong * light, vec3<f32>(1.0), 0.6 * smoothstep(0.75, 1.0, r));
+}
+
+fn opaque_color(position: vec2<f32>, here: vec2<u32>) -> vec3<f32> {
+    let pixel = vec2<i32>(position);
     let surface = textureLoad(surfaces, pixel, 0).xy;
     if !is_splat(here.x) {
-        return vec4<f32>(sphere_color(here.x, surface.x), 1.0);
+        return sphere_color(here.x, surface.x);
     }
 
     let reach = i32(max(round(frame.line_width), 1.0));
@@ -255,10 +283,25 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     let below = textureLoad(seen, vec2<i32>(pixel.x, min(pixel.y + reach, last.y)), 0).xy;
 
     let depth = visual_depth(here.y);
-    let rough = visual_pixel_len() * (ROUGHNESS * length(vec2<f32>(center_offset(surface))) + ROUGHNESS_STEP);
+    let from_center = length(vec2<f32>(center_offset(surface)));
+    let rough = visual_pixel_len() * (ROUGHNESS * from_center + ROUGHNESS_STEP);
     let dark = crease(depth, rough, left, right) + crease(depth, rough, above, below);
-    var color = splat_color(pixel, here.x, surface, depth_of(here.y)) * exp(-CREASE_STRENGTH * dark);
+    var color = splat_color(pixel, here.x, surface, depth_of(here.y));
+    color *= exp(-CREASE_STRENGTH * look.eye_dome * dark);
 
+    if is_selected(here.x) {
+        let stripe = fract((position.x + position.y + frame.origin.x + frame.origin.y) / (STRIPE_STEP * frame.line_width));
+        color = mix(color, look.selected, select(SELECTED_TINT, STRIPE_TINT, stripe < STRIPE_SHARE));
+        let inside = is_selected(left.x) && is_selected(right.x) && is_selected(above.x) && is_selected(below.x);
+        if !inside {
+            color = mix(look.selected, vec3<f32>(1.0), 0.75);
+        }
+    } else {
+        color = mix(color, background(position.y), look.dim_unselected);
+    }
+    if has_flag(FLAG_WRONG, here.x - 1u) && from_center <= frame.ball_radius {
+        color = ball_color(from_center / frame.ball_radius);
+    }
     if look.n_highlights > 0u && is_highlighted(here.x) {
         color = mix(color, look.highlight, 0.55);
         let inside = is_highlighted(left.x) && is_highlighted(right.x) && is_highlighted(above.x) && is_highlighted(below.x);
@@ -266,5 +309,24 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
             color = mix(look.highlight, vec3<f32>(1.0), 0.45);
         }
     }
-    return vec4<f32>(color, 1.0);
+    return color;
+}
+
+@fragment
+fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
+    signs = sign_plane(position.x);
+    let here = textureLoad(seen, vec2<i32>(position.xy), 0).xy;
+    var color = vec4<f32>(background(position.y), 1.0);
+    if here.x != ID_NONE {
+        color = vec4<f32>(opaque_color(position.xy, here), 1.0);
+    } else if look.transparent != 0u {
+        color = vec4<f32>(0.0);
+    }
+    // A quiet line where the signs to compare with end.
+    let beyond = frame.origin.x + position.x - look.split;
+    let half_width = max(0.5 * frame.line_width, 0.5);
+    if beyond >= -half_width && beyond < half_width {
+        color = mix(color, vec4<f32>(SPLIT_COLOR, 1.0), SPLIT_OPACITY);
+    }
+    return color;
 }

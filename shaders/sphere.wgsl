@@ -1,7 +1,5 @@
 // Geometry pass of the spheres: discs that face the camera, of constant size on the screen.
 
-@group(0) @binding(1) var<storage, read> spheres: array<SphereMark>;
-
 struct Vertex {
     @builtin(position) position: vec4<f32>,
     @location(0) disc: vec2<f32>,
@@ -19,7 +17,7 @@ fn vertex(@builtin(vertex_index) vertex_index: u32) -> Vertex {
     let center = sphere.center - frame.eye;
     let depth = -dot(center, frame.back);
     let is_perspective = frame.perspective > 0.5;
-    if is_perspective && depth <= 0.0 {
+    if (is_perspective && depth <= 0.0) || is_clipped(sphere.center, center, depth) {
         out.position = nowhere();
         return out;
     }
@@ -28,7 +26,7 @@ fn vertex(@builtin(vertex_index) vertex_index: u32) -> Vertex {
     // The ring of a selected sphere takes room outside of it.
     let radius = frame.sphere_radius * select(1.0, SELECTED_RADIUS, sphere.selected != 0u);
     // Moved toward the eye, so that the surface on which it sits does not hide it unless that is steeper than 63°.
-    let lift = 2.0 * radius * frame.pixel_len * select(1.0, depth, is_perspective);
+    let lift = 2.0 * radius * pixel_len_at(depth);
     let corner = triangle_corner(vertex_index % 3u);
     var position = frame.clip_from_eye * vec4<f32>(center + to_eye * lift, 1.0);
     position = vec4<f32>(position.xy + corner * radius * 2.0 / frame.size * position.w, position.zw);

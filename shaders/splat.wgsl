@@ -8,15 +8,9 @@ const MIN_RADIUS: f32 = 0.71;
 // nearly, each shows what is closest to its own center, instead of what rounding makes of equal depths.
 const CONE: f32 = 0.1;
 
-struct Chunk {
-    first: u32,
-    pad_0: u32,
-    pad_1: u32,
-    pad_2: u32,
-}
-
-@group(1) @binding(0) var<uniform> chunk: Chunk;
-@group(1) @binding(1) var<storage, read> points: array<Point>;
+// How far a ball lies before its splat in the depth test, in radii of the ball: before the discs beside it, unless the
+// surface is steeper than 63°.
+const BALL_LIFT: f32 = 2.0;
 
 struct Vertex {
     @builtin(position) position: vec4<f32>,
@@ -27,6 +21,8 @@ struct Vertex {
     @location(3) @interpolate(flat) center: vec2<f32>,
     // How the cone changes the clip-space depth: a quotient (in perspective) and a difference (in parallel views).
     @location(4) @interpolate(flat) cone: vec2<f32>,
+    // The same for a ball, the other way; zero without one.
+    @location(5) @interpolate(flat) ball: vec2<f32>,
 }
 
 struct Fragment {
@@ -40,20 +36,25 @@ fn pack_cosine(cosine: f32) -> u32 {
     return select(0u, 512u, cosine < 0.0) | u32(min(abs(cosine), 1.0) * 511.0 + 0.5);
 }
 
+// How a world length along the line of sight changes the clip-space depth there: see Vertex.
+fn depth_change(len: f32, depth: f32) -> vec2<f32> {
+    let parallel = vec2<f32>(0.0, len / -frame.depth_from_clip.y);
+    return select(parallel, vec2<f32>(len / depth, 0.0), frame.perspective > 0.5);
+}
+
 @vertex
 fn vertex(@builtin(vertex_index) vertex_index: u32) -> Vertex {
-    // The drawn instances are the multiples of the stride, in whichever chunk they are.
-    let skipped = (frame.stride - chunk.first % frame.stride) % frame.stride;
-    let local = skipped + vertex_index / 3u * frame.stride;
+    let local = nth_of_chunk(vertex_index / 3u, frame.stride);
     let point = points[local];
+    let instance = chunk.first + local;
 
     var out: Vertex;
-    out.id = chunk.first + local + 1u;
+    out.id = instance + 1u;
 
     let center = point.position - frame.eye;
     let depth = -dot(center, frame.back);
     let is_perspective = frame.perspective > 0.5;
-    if is_perspective && depth <= 0.0 {
+    if is_left_out(instance, point.position, center, depth) {
         out.position = nowhere();
         return out;
     }
@@ -76,7 +77,10 @@ fn vertex(@builtin(vertex_index) vertex_index: u32) -> Vertex {
     let across = cross(to_eye, long);
 
     let radius = unpack_radius(point.packed) * frame.max_radius;
-    let least = MIN_RADIUS * frame.pixel_len * select(1.0, depth, is_perspective);
+    // A disc with a ball has room for it.
+    let pixel_len = pixel_len_at(depth);
+    let is_wrong = has_flag(FLAG_WRONG, instance);
+    let least = select(MIN_RADIUS, frame.ball_radius + 1.0, is_wrong) * pixel_len;
     let seen = dot(short, across);
     let grow = max(least - radius * abs(seen), 0.0) * select(-1.0, 1.0, seen >= 0.0);
 
@@ -89,7 +93,8 @@ fn vertex(@builtin(vertex_index) vertex_index: u32) -> Vertex {
     let in_clip = frame.clip_from_eye * vec4<f32>(center, 1.0);
     out.center = (vec2<f32>(0.5, -0.5) * in_clip.xy / in_clip.w + 0.5) * frame.size;
     let drop = CONE * drawn_radius;
-    out.cone = select(vec2<f32>(0.0, drop / -frame.depth_from_clip.y), vec2<f32>(drop / depth, 0.0), is_perspective);
+    out.cone = depth_change(drop, depth);
+    out.ball = select(vec2<f32>(0.0), depth_change(BALL_LIFT * frame.ball_radius * pixel_len, depth), is_wrong);
     return out;
 }
 
@@ -107,7 +112,13 @@ fn fragment(in: Vertex) -> Fragment {
     }
     var out: Fragment;
     out.id_and_depth = vec2<u32>(in.id, bitcast<u32>(in.position.z));
-    out.surface = vec2<u32>(in.normal, pack_offset(floor(in.center) - floor(in.position.xy)));
+    let to_center = floor(in.center) - floor(in.position.xy);
+    out.surface = vec2<u32>(in.normal, pack_offset(to_center));
     out.depth = in.position.z / (1.0 + in.cone.x * r_squared) - in.cone.y * r_squared;
+    // The ball wins the depth test, but what is kept is the depth of the surface: that is what a pick means, and the
+    // shading sees no step.
+    if any(in.ball > vec2<f32>(0.0)) && length(to_center) <= frame.ball_radius {
+        out.depth = in.position.z / max(1.0 - in.ball.x, 0.5) + in.ball.y;
+    }
     return out;
 }

@@ -16,12 +16,14 @@ pub const SPACE_L: f32 = 16.0;
 
 /// Width of the side panel, in points.
 pub const SIDE_PANEL_WIDTH: f32 = 324.0;
+/// Width of what the side panel holds, with or without a bar.
+pub const SIDE_CONTENT_WIDTH: f32 = SIDE_PANEL_WIDTH - 2.0 * SPACE_M - SCROLL_WIDTH;
 /// Width of the first column of label/value rows, in points.
 pub const LABEL_WIDTH: f32 = 104.0;
 /// Width of the scroll bar beside a panel, in points.
 pub const SCROLL_WIDTH: f32 = 6.0;
 /// Width of the second column, where inputs end at the same right edge, in points.
-pub const VALUE_WIDTH: f32 = SIDE_PANEL_WIDTH - 2.0 * SPACE_M - SCROLL_WIDTH - LABEL_WIDTH - SPACE_S;
+pub const VALUE_WIDTH: f32 = SIDE_CONTENT_WIDTH - LABEL_WIDTH - SPACE_S;
 /// Width of the number beside a slider, in points.
 const SLIDER_VALUE_WIDTH: f32 = 52.0;
 /// Height of rows that are only read, in points.
@@ -181,12 +183,14 @@ pub fn palette(choice: PaletteChoice, dark: bool) -> Palette {
             back: [0.55, 0.30, 0.75],
             highlight: [1.0, 0.93, 0.25],
             background: background(dark),
+            ..Palette::BLUE_ORANGE
         },
         PaletteChoice::YellowBlue => Palette {
-            front: [0.95, 0.85, 0.40],
+            front: [0.93, 0.79, 0.28],
             back: [0.16, 0.36, 0.78],
             highlight: [1.0, 0.45, 0.40],
             background: background(dark),
+            ..Palette::BLUE_ORANGE
         },
         PaletteChoice::Paper => Palette::PAPER,
     }
@@ -361,6 +365,99 @@ mod tests {
         };
         let (a, b) = (luminance(a), luminance(b));
         (a.max(b) + 0.05) / (a.min(b) + 0.05)
+    }
+
+    /// How a color looks with full vision and with each kind of color blindness, in linear light: Machado, Oliveira and
+    /// Fernandes, "A Physiologically-based Model for Simulation of Color Vision Deficiency" (2009), at severity 1.
+    const VISIONS: [(&str, [[f32; 3]; 3]); 4] = [
+        ("full", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+        (
+            "protan",
+            [
+                [0.152_286, 1.052_583, -0.204_868],
+                [0.114_503, 0.786_281, 0.099_216],
+                [-0.003_882, -0.048_116, 1.051_998],
+            ],
+        ),
+        (
+            "deutan",
+            [
+                [0.367_322, 0.860_646, -0.227_968],
+                [0.280_085, 0.672_501, 0.047_413],
+                [-0.011_820, 0.042_940, 0.968_881],
+            ],
+        ),
+        (
+            "tritan",
+            [
+                [1.255_528, -0.076_749, -0.178_779],
+                [-0.078_411, 0.930_809, 0.147_602],
+                [0.004_733, 0.691_367, 0.303_900],
+            ],
+        ),
+    ];
+
+    fn times(matrix: &[[f32; 3]; 3], v: [f32; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|row| (0..3).map(|column| matrix[row][column] * v[column]).sum())
+    }
+
+    /// Oklab (Björn Ottosson, 2020) of linear sRGB; distances are in hundredths of the way from black to white.
+    fn oklab(linear: [f32; 3]) -> [f32; 3] {
+        let cones = times(
+            &[
+                [0.412_221_5, 0.536_332_5, 0.051_446],
+                [0.211_903_5, 0.680_699_5, 0.107_397],
+                [0.088_302_5, 0.281_718_8, 0.629_978_7],
+            ],
+            linear,
+        );
+        times(
+            &[
+                [0.210_454_3, 0.793_617_8, -0.004_072],
+                [1.977_998_5, -2.428_592_2, 0.450_593_7],
+                [0.025_904, 0.782_771_8, -0.808_675_8],
+            ],
+            cones.map(f32::cbrt),
+        )
+    }
+
+    #[test]
+    fn front_and_back_are_told_apart_with_any_color_vision() {
+        let linear = |srgb: [f32; 3]| {
+            srgb.map(|value| {
+                if value <= 0.04045 {
+                    value / 12.92
+                } else {
+                    ((value + 0.055) / 1.055).powf(2.4)
+                }
+            })
+        };
+        for choice in PaletteChoice::ALL {
+            for dark in [false, true] {
+                let palette = palette(choice, dark);
+                for (vision, matrix) in &VISIONS {
+                    let seen = |color: [f32; 3], light: f32| {
+                        let lit = linear(color).map(|value| value * light);
+                        oklab(times(matrix, lit).map(|value| value.clamp(0.0, 1.0)))
+                    };
+                    let distance = |a: [f32; 3], b: [f32; 3]| {
+                        100.0 * (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f32>().sqrt()
+                    };
+                    // Two patches side by side in the same light, and with light from any side on either.
+                    let same = distance(seen(palette.front, 1.0), seen(palette.back, 1.0));
+                    assert!(same >= 25.0, "{choice:?}, {vision}: {same:.1}");
+                    let lights = [0.35, 0.5, 0.7, 0.85, 1.0];
+                    let worst = lights
+                        .into_iter()
+                        .flat_map(|front| lights.into_iter().map(move |back| (front, back)))
+                        .map(|(front, back)| distance(seen(palette.front, front), seen(palette.back, back)))
+                        .fold(f32::INFINITY, f32::min);
+                    assert!(worst >= 11.0, "{choice:?}, {vision}, in unlike light: {worst:.1}");
+                    let highlighted = distance(seen(palette.front, 1.0), seen(palette.highlight, 1.0));
+                    assert!(highlighted >= 10.0, "{choice:?}, {vision}: highlight at {highlighted:.1}");
+                }
+            }
+        }
     }
 
     #[test]

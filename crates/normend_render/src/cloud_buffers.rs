@@ -1,8 +1,8 @@
-//! The cloud on the GPU: points uploaded once in chunks below the adapter's limits, signs by touched words.
-//!
-//! Invariant: `turned` mirrors the GPU's sign bits, so a turn uploads words without reading anything back.
+//! The cloud on the GPU: points uploaded once in chunks below the adapter's limits, their bits by touched words, their
+//! colors when something gives them.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use egui_wgpu::wgpu;
 use egui_wgpu::wgpu::util::DeviceExt as _;
@@ -11,12 +11,12 @@ use rayon::prelude::*;
 
 use crate::camera::BoundingSphere;
 use crate::error::RenderError;
+use crate::flags::Flags;
 use crate::gpu_types::{Chunk, MAX_SPLATS, Point};
+use crate::storage::{binding_limit, storage_buffer};
 
 /// Most points of a chunk: 64 MiB.
 pub const MAX_CHUNK_POINTS: usize = 4 << 20;
-/// Touched words closer than this are uploaded together: a kilobyte costs less than another upload.
-const MERGE_WORDS: u32 = 256;
 /// Points that one task reduces; fixed, so that no result depends on the number of threads.
 const BLOCK: usize = 1 << 16;
 
@@ -27,11 +27,30 @@ struct ChunkBuffers {
     n_points: u32,
 }
 
-/// The cloud on the GPU, with the mirror of its signs.
+/// The points of a cloud: handles, so a clone is cheap and can be drawn in another thread.
+#[derive(Clone)]
+pub struct Chunks(Arc<[ChunkBuffers]>);
+
+impl Chunks {
+    /// Draws every `step`-th instance, in their order, with `vertices` vertices each.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, step: u32, vertices: u32) {
+        for chunk in &*self.0 {
+            let skipped = (step - chunk.first % step) % step;
+            let n_drawn = chunk.n_points.saturating_sub(skipped).div_ceil(step);
+            if n_drawn > 0 {
+                pass.set_bind_group(1, &chunk.bind_group, &[]);
+                pass.draw(0..vertices * n_drawn, 0..1);
+            }
+        }
+    }
+}
+
+/// The cloud on the GPU.
 pub struct CloudBuffers {
-    chunks: Vec<ChunkBuffers>,
-    turned: Vec<u32>,
-    turned_buffer: wgpu::Buffer,
+    chunks: Chunks,
+    /// Signs and marks.
+    pub flags: Flags,
+    colors: Option<wgpu::Buffer>,
     n_points: u32,
     max_radius: f32,
     bounds: BoundingSphere,
@@ -115,7 +134,7 @@ impl CloudSlices<'_> {
 const EMPTY_BOX: (Vec3, Vec3) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
 
 impl CloudBuffers {
-    /// Uploads a cloud in chunks of at most `max_chunk_points`; all signs are 0. Returns the bytes uploaded too.
+    /// Uploads a cloud in chunks of at most `max_chunk_points`; all bits are 0, and there are no colors. Returns the bytes uploaded too.
     ///
     /// # Errors
     /// [`RenderError`] for slices that do not belong together and clouds past the adapter's limits.
@@ -127,17 +146,8 @@ impl CloudBuffers {
     ) -> Result<(Self, u64), RenderError> {
         cloud.check()?;
         let n_points = cloud.positions.len();
-        let limits = device.limits();
-        let limit = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
-        let turned = vec![0_u32; n_points.div_ceil(32).max(1)];
-        let needed = size_of_val(turned.as_slice()) as u64;
-        if needed > limit {
-            return Err(RenderError::BufferTooLarge {
-                what: "signs of the points",
-                needed,
-                limit,
-            });
-        }
+        let limit = binding_limit(device);
+        let flags = Flags::new(device, n_points)?;
         let chunk_points = max_chunk_points.min((limit / size_of::<Point>() as u64) as usize);
         if chunk_points == 0 {
             return Err(RenderError::BufferTooLarge {
@@ -149,13 +159,12 @@ impl CloudBuffers {
 
         let (max_radius, bounds) = cloud.extent();
         let n_chunks = n_points.div_ceil(chunk_points);
-        let bytes = needed + (n_points * size_of::<Point>() + n_chunks * size_of::<Chunk>()) as u64;
+        let bytes = flags.n_bytes() + (n_points * size_of::<Point>() + n_chunks * size_of::<Chunk>()) as u64;
         let out_of_memory = |error: wgpu::Error| RenderError::OutOfMemory {
             n_points,
             needed: bytes,
             reason: error.to_string(),
         };
-        let turned_buffer = storage_buffer(device, "signs", &turned).map_err(out_of_memory)?;
         let mut chunks = Vec::with_capacity(n_chunks);
         for first in (0..n_points).step_by(chunk_points) {
             let end = n_points.min(first + chunk_points);
@@ -192,9 +201,9 @@ impl CloudBuffers {
             });
         }
         let buffers = Self {
-            chunks,
-            turned,
-            turned_buffer,
+            chunks: Chunks(chunks.into()),
+            flags,
+            colors: None,
             n_points: n_points as u32,
             max_radius,
             bounds,
@@ -202,9 +211,14 @@ impl CloudBuffers {
         Ok((buffers, bytes))
     }
 
-    /// The sign bits on the GPU.
-    pub fn turned_buffer(&self) -> &wgpu::Buffer {
-        &self.turned_buffer
+    /// What is drawn.
+    pub fn chunks(&self) -> &Chunks {
+        &self.chunks
+    }
+
+    /// The colors of the instances, when something gave them.
+    pub fn colors(&self) -> Option<&wgpu::Buffer> {
+        self.colors.as_ref()
     }
 
     /// World radius of the largest splat.
@@ -217,137 +231,57 @@ impl CloudBuffers {
         self.bounds
     }
 
-    /// Draws every `stride`-th splat: three vertices each, in the order of the instances.
-    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, stride: u32) {
-        for chunk in &self.chunks {
-            let skipped = (stride - chunk.first % stride) % stride;
-            let n_drawn = chunk.n_points.saturating_sub(skipped).div_ceil(stride);
-            if n_drawn > 0 {
-                pass.set_bind_group(1, &chunk.bind_group, &[]);
-                pass.draw(0..3 * n_drawn, 0..1);
-            }
+    /// Gives every instance a color, or none: RGBA8 with red in the lowest byte. Returns the bytes uploaded.
+    ///
+    /// # Errors
+    /// [`RenderError::Mismatch`], [`RenderError::BufferTooLarge`] and [`RenderError::OutOfMemory`]; there are no colors
+    /// then.
+    pub fn set_colors(&mut self, device: &wgpu::Device, colors: Option<&[u32]>) -> Result<u64, RenderError> {
+        // The old buffer goes first, so that both need not fit at once.
+        self.colors = None;
+        let Some(colors) = colors else { return Ok(0) };
+        if colors.len() != self.n_points as usize {
+            return Err(RenderError::Mismatch {
+                what: "colors of the points",
+                expected: self.n_points as usize,
+                found: colors.len(),
+            });
         }
-    }
-
-    /// Toggles the signs of `ranges` and uploads the words that they touch; returns the bytes uploaded.
-    pub fn turn(&mut self, queue: &wgpu::Queue, ranges: &[Range<u32>]) -> u64 {
-        let mut touched: Vec<Range<u32>> = Vec::with_capacity(ranges.len());
-        for range in ranges {
-            let range = range.start..range.end.min(self.n_points);
-            if range.start < range.end {
-                toggle(&mut self.turned, range.clone());
-                touched.push(range.start / 32..(range.end - 1) / 32 + 1);
-            }
+        if colors.is_empty() {
+            return Ok(0);
         }
-        touched.sort_unstable_by_key(|words| words.start);
-        let mut uploaded = 0;
-        for words in merge(&touched, MERGE_WORDS) {
-            let slice = &self.turned[words.start as usize..words.end as usize];
-            queue.write_buffer(
-                &self.turned_buffer,
-                u64::from(words.start) * 4,
-                bytemuck::cast_slice(slice),
-            );
-            uploaded += size_of_val(slice) as u64;
+        let (needed, limit) = (size_of_val(colors) as u64, binding_limit(device));
+        if needed > limit {
+            return Err(RenderError::BufferTooLarge {
+                what: "colors of the points",
+                needed,
+                limit,
+            });
         }
-        uploaded
+        let buffer = storage_buffer(device, "colors", colors).map_err(|error| RenderError::OutOfMemory {
+            n_points: colors.len(),
+            needed,
+            reason: error.to_string(),
+        })?;
+        self.colors = Some(buffer);
+        Ok(needed)
     }
 
-    /// Sets all signs; words that are missing are 0. Returns the bytes uploaded.
-    pub fn set_turned(&mut self, queue: &wgpu::Queue, words: &[u32]) -> u64 {
-        let n = words.len().min(self.turned.len());
-        self.turned[..n].copy_from_slice(&words[..n]);
-        self.turned[n..].fill(0);
-        queue.write_buffer(&self.turned_buffer, 0, bytemuck::cast_slice(&self.turned));
-        size_of_val(self.turned.as_slice()) as u64
-    }
-}
-
-/// A buffer that holds `data`, which is not empty and of whole words; an error when the graphics memory is full.
-///
-/// Not by `create_buffer_init`, which panics then.
-fn storage_buffer<T: bytemuck::Pod>(
-    device: &wgpu::Device,
-    label: &str,
-    data: &[T],
-) -> Result<wgpu::Buffer, wgpu::Error> {
-    let bytes: &[u8] = bytemuck::cast_slice(data);
-    let memory_scope = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(label),
-        size: bytes.len() as u64,
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: true,
-    });
-    if let Some(error) = pollster::block_on(memory_scope.pop()) {
-        return Err(error);
-    }
-    // Only a lost device gives no range, and then there is nothing to write to.
-    if let Ok(mut mapped) = buffer.get_mapped_range_mut(..) {
-        mapped.slice(..).copy_from_slice(bytes);
-        drop(mapped);
-        buffer.unmap();
-    }
-    Ok(buffer)
-}
-
-/// Flips the bits of a range that is not empty and lies within `words`.
-fn toggle(words: &mut [u32], range: Range<u32>) {
-    let (first, last) = ((range.start / 32) as usize, ((range.end - 1) / 32) as usize);
-    let head = u32::MAX << (range.start % 32);
-    let tail = u32::MAX >> (31 - (range.end - 1) % 32);
-    if first == last {
-        words[first] ^= head & tail;
-        return;
-    }
-    words[first] ^= head;
-    for word in &mut words[first + 1..last] {
-        *word = !*word;
-    }
-    words[last] ^= tail;
-}
-
-/// Joins ranges, sorted by start, that are less than `gap` apart.
-fn merge(sorted: &[Range<u32>], gap: u32) -> Vec<Range<u32>> {
-    let mut merged: Vec<Range<u32>> = Vec::new();
-    for range in sorted {
-        match merged.last_mut() {
-            Some(last) if range.start <= last.end.saturating_add(gap) => last.end = last.end.max(range.end),
-            _ => merged.push(range.clone()),
+    /// Replaces the colors of the instances from `first` on, as many as there are; nothing without colors. Returns the
+    /// bytes uploaded.
+    pub fn update_colors(&self, queue: &wgpu::Queue, first: u32, colors: &[u32]) -> u64 {
+        let Some(buffer) = &self.colors else { return 0 };
+        let n = colors.len().min(self.n_points.saturating_sub(first) as usize);
+        if n > 0 {
+            queue.write_buffer(buffer, u64::from(first) * 4, bytemuck::cast_slice(&colors[..n]));
         }
+        size_of_val(&colors[..n]) as u64
     }
-    merged
 }
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
-
-    proptest! {
-        #[test]
-        fn toggle_flips_the_bits_of_the_range_alone(start in 0_u32..200, len in 1_u32..200) {
-            let range = start..(start + len).min(256);
-            prop_assume!(!range.is_empty());
-            let mut words = [0x5a5a_1234_u32; 8];
-            toggle(&mut words, range.clone());
-            for bit in 0..256 {
-                let was = 0x5a5a_1234_u32 >> (bit % 32) & 1 == 1;
-                let is = words[bit as usize / 32] >> (bit % 32) & 1 == 1;
-                prop_assert_eq!(is != was, range.contains(&bit), "bit {}", bit);
-            }
-        }
-    }
-
-    #[test]
-    fn merge_joins_what_is_near() {
-        let check = |input: &[Range<u32>], expect: &[Range<u32>]| assert_eq!(merge(input, 10), expect);
-        check(&[], &[]);
-        check(&[0..3, 5..6, 17..18], &[0..6, 17..18]);
-        check(&[0..30, 5..6, 50..60], &[0..30, 50..60]);
-        check(&[0..1, 11..12, 23..24], &[0..12, 23..24]);
-    }
 
     #[test]
     fn slices_that_do_not_belong_together_are_refused() {

@@ -71,4 +71,17 @@ pub enum RenderError {
         /// What the driver says.
         reason: String,
     },
+    /// A picture that cannot be drawn at its size.
+    #[error("a picture of {width}x{height} pixels cannot be drawn ({reason}); try a smaller one")]
+    Picture {
+        /// Pixels across.
+        width: u32,
+        /// Pixels down.
+        height: u32,
+        /// Why.
+        reason: String,
+    },
+    /// The caller's progress said to stop.
+    #[error("the picture was canceled")]
+    Canceled,
 }

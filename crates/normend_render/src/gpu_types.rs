@@ -19,7 +19,27 @@ pub const RADIUS_CODE_MAX: u32 = 1023;
 /// Codes per octave of the radius: 1023 codes reach 2⁻¹⁶ of the largest radius, in steps of 1.1 %.
 pub const RADIUS_CODES_PER_OCTAVE: f32 = 64.0;
 
-/// What both geometry and shading need to know of the camera and the cloud.
+/// A bit that every point has; its number is that of its plane of words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flag {
+    /// The normal is shown the other way.
+    Turned = 0,
+    /// Marked as selected.
+    Selected = 1,
+    /// Neither drawn nor picked.
+    Hidden = 2,
+    /// Like [`Self::Turned`], of the signs to compare with.
+    Compared = 3,
+    /// Marked with a ball.
+    Wrong = 4,
+}
+
+impl Flag {
+    /// Planes of bits.
+    pub const COUNT: usize = 5;
+}
+
+/// What the geometry needs to know of the camera, the cloud, and what is cut away.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Frame {
@@ -41,7 +61,7 @@ pub struct Frame {
     pub depth_from_clip: Vec4,
     /// Depths of the nearest and the farthest point of the scene.
     pub scene_depth: Vec2,
-    /// Picture size in pixels.
+    /// Size of what is drawn at once in pixels: the picture, or a tile of it.
     pub size: Vec2,
     /// Depth of the pivot.
     pub pivot_depth: f32,
@@ -51,9 +71,33 @@ pub struct Frame {
     pub line_width: f32,
     /// Each `stride`-th instance is drawn.
     pub stride: u32,
+    /// Low corner of the box outside of which nothing is drawn, in world space.
+    pub clip_min: Vec3,
+    /// Nothing is drawn nearer than this depth.
+    pub near_depth: f32,
+    /// High corner of that box.
+    pub clip_max: Vec3,
+    /// Words of each plane of flags.
+    pub plane_words: u32,
+    /// Unit vector across the slab outside of which nothing is drawn; zero without one.
+    pub section: Vec3,
+    /// Where the middle of the slab lies along that vector, from the eye.
+    pub section_offset: f32,
+    /// First pixel of what is drawn at once, in the whole picture.
+    pub origin: Vec2,
+    /// Size of the whole picture in pixels.
+    pub whole: Vec2,
+    /// Half the thickness of the slab.
+    pub section_half: f32,
+    /// Radius in pixels of the ball that marks a wrong point.
+    pub ball_radius: f32,
+    /// Zero.
+    pub pad_0: u32,
+    /// Zero.
+    pub pad_1: u32,
 }
 
-/// Colors and mode of the shade pass.
+/// Colors and mode: what the shade pass and the hair need, and the geometry does not.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Look {
@@ -67,12 +111,36 @@ pub struct Look {
     pub n_highlights: u32,
     /// Background color.
     pub background: Vec3,
-    /// Zero.
-    pub pad_0: u32,
+    /// 1 leaves the background out.
+    pub transparent: u32,
     /// Highlight color.
     pub highlight: Vec3,
+    /// Strength of the darkening of edges and creases; 1 is the most.
+    pub eye_dome: f32,
+    /// Selection color.
+    pub selected: Vec3,
+    /// How much of what is not selected fades into the background.
+    pub dim_unselected: f32,
+    /// Color of a surface where no other color is asked for.
+    pub surface: Vec3,
+    /// Pixels of the whole picture left of this one show the compared signs.
+    pub split: f32,
+    /// Color of the balls on wrong points.
+    pub wrong: Vec3,
+    /// 1 when the instances have colors.
+    pub has_colors: u32,
+    /// Hair color, unless by side.
+    pub hair: Vec3,
+    /// Length of a hair in pixels or in world length.
+    pub hair_len: f32,
+    /// Each so-many-th drawn instance has a hair.
+    pub hair_every: u32,
+    /// 1 when the length is in pixels.
+    pub hair_in_pixels: u32,
+    /// 1 when hair has the colors of front and back.
+    pub hair_by_side: u32,
     /// Zero.
-    pub pad_1: u32,
+    pub pad_0: u32,
 }
 
 /// Which part of the cloud a chunk holds.

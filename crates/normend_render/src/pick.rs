@@ -3,14 +3,13 @@
 //! A click must not fall through a gap between splats to a surface behind, and must hit what is meant at an edge. So
 //! the nearest surface in the window wins; on it, the pixel closest to the one asked for.
 
-use std::sync::{Arc, OnceLock};
-
 use egui_wgpu::wgpu;
 use glam::{UVec2, Vec2, Vec3};
 
 use crate::Camera;
 use crate::camera::BoundingSphere;
 use crate::gpu_types::{ID_NONE, ID_SPHERE};
+use crate::read_back::{ReadBack, SEEN_BYTES};
 
 /// Pixels that the window reaches beyond the picked one, on each side.
 const REACH: u32 = 4;
@@ -18,8 +17,6 @@ const REACH: u32 = 4;
 /// to the line of sight), and beyond that, for discs that overlap.
 const STEEPEST: f32 = 2.5;
 const STEP: f32 = 2.0;
-/// Bytes of a pixel: id and depth.
-const PIXEL_BYTES: u32 = 8;
 
 /// What is under the pointer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,20 +62,22 @@ impl PictureView {
         UVec2::from(self.size).as_vec2()
     }
 
-    fn depth(&self, clip_z: f32) -> f32 {
+    /// Depth (world length along the view axis) of a clip-space depth.
+    pub fn depths(&self) -> impl Fn(f32) -> f32 + use<> {
         let [a, b, c, d] = self.camera.depth_from_clip(self.scene).to_array();
-        (a + b * clip_z) / (c + d * clip_z)
+        move |clip_z| (a + b * clip_z) / (c + d * clip_z)
     }
 
     /// The hit that `window` means: its first pixel is `origin`, its rows have `width` pixels of id and depth bits.
     fn hit(&self, window: &[[u32; 2]], width: u32, origin: UVec2, pixel: UVec2) -> Option<Hit> {
+        let depth_of = self.depths();
         let seen: Vec<(u32, UVec2, f32)> = window
             .iter()
             .enumerate()
             .filter(|(_, [id, _])| *id != ID_NONE)
             .map(|(i, &[id, bits])| {
                 let at = origin + UVec2::new(i as u32 % width, i as u32 / width);
-                (id, at, self.depth(f32::from_bits(bits)))
+                (id, at, depth_of(f32::from_bits(bits)))
             })
             .collect();
         // A pixel is on the nearest surface unless another lies before it by more than one surface could.
@@ -113,10 +112,7 @@ pub struct PickRequest {
     pixel: UVec2,
     origin: UVec2,
     width: u32,
-    height: u32,
-    buffer: wgpu::Buffer,
-    /// Set when the copy has ended: whether it can be read.
-    arrived: Arc<OnceLock<bool>>,
+    read_back: ReadBack,
 }
 
 impl PickRequest {
@@ -132,83 +128,30 @@ impl PickRequest {
         let pixel = UVec2::from(pixel).min(size - 1);
         let origin = pixel.saturating_sub(UVec2::splat(REACH));
         let extent = (pixel + REACH + 1).min(size) - origin;
-        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("pick"),
-            size: u64::from(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT * extent.y),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("pick") });
-        encoder.copy_texture_to_buffer(
-            wgpu::TexelCopyTextureInfo {
-                origin: wgpu::Origin3d {
-                    x: origin.x,
-                    y: origin.y,
-                    z: 0,
-                },
-                ..seen.as_image_copy()
-            },
-            wgpu::TexelCopyBufferInfo {
-                buffer: &buffer,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT),
-                    rows_per_image: None,
-                },
-            },
-            wgpu::Extent3d {
-                width: extent.x,
-                height: extent.y,
-                depth_or_array_layers: 1,
-            },
-        );
-        queue.submit([encoder.finish()]);
-        let arrived = Arc::new(OnceLock::new());
-        let arrival = Arc::clone(&arrived);
-        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-            // A second arrival cannot happen, and the first one counts.
-            let _ = arrival.set(result.is_ok());
-        });
         Self {
             view,
             pixel,
             origin,
             width: extent.x,
-            height: extent.y,
-            buffer,
-            arrived,
+            read_back: ReadBack::new(device, queue, seen, origin, extent, SEEN_BYTES),
         }
     }
 
     /// `None` while under way; then `Some(hit)`, where `hit` is `None` for background and for a lost device. Never
     /// blocks.
     pub fn poll(&mut self, device: &wgpu::Device) -> Option<Option<Hit>> {
-        if let Err(error) = device.poll(wgpu::PollType::Poll) {
-            tracing::debug!("polling the graphics device: {error}");
-        }
-        self.arrived
-            .get()
-            .map(|&readable| if readable { self.read() } else { None })
+        self.read_back.has_arrived(device).then(|| self.read())
     }
 
     /// Waits for the result; for tests and headless use.
     pub fn wait(self, device: &wgpu::Device) -> Option<Hit> {
-        if let Err(error) = device.poll(wgpu::PollType::wait_indefinitely()) {
-            tracing::debug!("waiting for the graphics device: {error}");
-        }
-        if *self.arrived.get()? { self.read() } else { None }
+        self.read_back.wait(device);
+        self.read()
     }
 
     fn read(&self) -> Option<Hit> {
-        let bytes = self.buffer.get_mapped_range(..).ok()?;
-        let row_bytes = (self.width * PIXEL_BYTES) as usize;
-        let window: Vec<[u32; 2]> = bytes
-            .chunks(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as usize)
-            .take(self.height as usize)
-            .flat_map(|row| row[..row_bytes].chunks_exact(PIXEL_BYTES as usize))
-            .map(bytemuck::pod_read_unaligned)
-            .collect();
-        self.view.hit(&window, self.width, self.origin, self.pixel)
+        self.view
+            .hit(&self.read_back.pixels(), self.width, self.origin, self.pixel)
     }
 }
 

@@ -1,43 +1,29 @@
 //! [`SplatRenderer`]: uploads, draws when something changed, picks.
 //!
-//! A picture has two steps. Geometry leaves what is seen at each pixel; it depends on the cloud and the camera. Shading
-//! makes colors of that; it depends on signs and highlights too. A turn or a hover redraws the second step alone.
+//! A picture has two steps. Geometry leaves what is seen at each pixel; it depends on the cloud, the camera, and what is
+//! hidden or cut away. Shading makes colors of that; it depends on signs, colors and highlights too. A turn or a hover
+//! redraws the second step alone.
 
 use std::ops::Range;
 
 use egui_wgpu::wgpu;
-use glam::{Mat4, UVec2, Vec2, Vec3};
+use glam::{UVec2, Vec3};
 
 use crate::camera::BoundingSphere;
+use crate::canvas::{Canvas, Stage};
 use crate::cloud_buffers::{CloudBuffers, CloudSlices, MAX_CHUNK_POINTS};
-use crate::gpu_types::{Frame, Look, SphereMark};
+use crate::gpu_types::{Flag, SphereMark};
 use crate::marks::{GrowingBuffer, highlight_words};
-use crate::pass::shade::ShadePass;
-use crate::pass::{self, PICTURE_FORMAT, SEEN_FORMAT, SURFACE_FORMAT, Targets};
+use crate::pass::{PICTURE_FORMAT, Passes, SEEN_FORMAT, SURFACE_FORMAT};
 use crate::pick::PictureView;
-use crate::{Camera, DrawSettings, PickRequest, Projection, RenderError, Sphere};
+#[cfg(test)]
+use crate::read_back::SEEN_BYTES;
+use crate::read_back::{COLOR_BYTES, ReadBack};
+use crate::uniforms::{Has, Shot, radius_scale};
+use crate::{Camera, DrawSettings, IdsRequest, PickRequest, PictureMaker, RenderError, Sphere};
 
-/// Radius of a sphere, in points of the user interface.
-const SPHERE_RADIUS: f32 = 6.0;
-/// Storage buffers that a shader stage reads: spheres, signs, highlights.
-const STORAGE_BUFFERS: u32 = 3;
-
-/// Everything a picture is drawn from, apart from what the setters upload.
-#[derive(Clone, Copy, PartialEq)]
-struct Drawn {
-    view: PictureView,
-    pixels_per_point: f32,
-    settings: DrawSettings,
-}
-
-impl Drawn {
-    fn same_geometry(&self, other: &Self) -> bool {
-        self.view == other.view
-            && self.pixels_per_point == other.pixels_per_point
-            && self.settings.splat_scale == other.settings.splat_scale
-            && self.settings.stride == other.settings.stride
-    }
-}
+/// Storage buffers that a shader stage reads, at most: spheres, flags, highlights, colors.
+const STORAGE_BUFFERS: u32 = 4;
 
 /// Uploads clouds for one renderer, in any thread.
 #[derive(Clone, Debug)]
@@ -78,22 +64,17 @@ impl CloudUploader {
 
 /// Draws a cloud of oriented disc splats into its own texture.
 pub struct SplatRenderer {
-    chunk_layout: wgpu::BindGroupLayout,
-    frame_layout: wgpu::BindGroupLayout,
-    splat_pipeline: wgpu::RenderPipeline,
-    sphere_pipeline: wgpu::RenderPipeline,
-    shade_pass: ShadePass,
-    frame_buffer: wgpu::Buffer,
-    look_buffer: wgpu::Buffer,
-    /// Bound as signs while there is no cloud.
-    no_signs: wgpu::Buffer,
+    passes: Passes,
+    /// Bound as flags and colors while there are none.
+    nothing: wgpu::Buffer,
     cloud: Option<CloudBuffers>,
+    has_compared: bool,
     highlights: GrowingBuffer<[u32; 2]>,
     spheres: GrowingBuffer<SphereMark>,
-    targets: Option<Targets>,
-    /// Of the frame and of the shade pass; `None` after a buffer or texture in them was replaced.
-    bound: Option<(wgpu::BindGroup, wgpu::BindGroup)>,
-    drawn: Option<Drawn>,
+    canvas: Option<Canvas>,
+    /// A buffer that the canvas binds was replaced.
+    bindings_are_stale: bool,
+    drawn: Option<Shot>,
     geometry_is_stale: bool,
     shade_is_stale: bool,
     texture_number: u64,
@@ -125,7 +106,7 @@ impl SplatRenderer {
         let lacks = if !flags.contains(wgpu::DownlevelFlags::VERTEX_STORAGE) {
             "storage buffers in vertex shaders"
         } else if limits.max_storage_buffers_per_shader_stage < STORAGE_BUFFERS {
-            "three storage buffers in a shader"
+            "four storage buffers in a shader"
         } else if !(is_target(SEEN_FORMAT) && is_target(SURFACE_FORMAT) && is_target(PICTURE_FORMAT)) {
             "drawing to integer textures"
         } else {
@@ -145,31 +126,20 @@ impl SplatRenderer {
 
     /// [`Self::new`] with chunks of at most `max_chunk_points`.
     pub(crate) fn with_chunks(device: &wgpu::Device, max_chunk_points: usize) -> Self {
-        let chunk_layout = pass::uniform_and_storage(device, "chunk", wgpu::ShaderStages::VERTEX);
-        // Every pass shares these: frame and spheres.
-        let frame_layout = pass::uniform_and_storage(device, "frame", wgpu::ShaderStages::VERTEX_FRAGMENT);
-        let buffer = |label, size: usize, usage| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size: size as u64,
-                usage: usage | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        };
         Self {
-            splat_pipeline: pass::splat::pipeline(device, &frame_layout, &chunk_layout),
-            sphere_pipeline: pass::sphere::pipeline(device, &frame_layout),
-            shade_pass: ShadePass::new(device, &frame_layout),
-            chunk_layout,
-            frame_layout,
-            frame_buffer: buffer("frame", size_of::<Frame>(), wgpu::BufferUsages::UNIFORM),
-            look_buffer: buffer("look", size_of::<Look>(), wgpu::BufferUsages::UNIFORM),
-            no_signs: buffer("no signs", size_of::<u32>(), wgpu::BufferUsages::STORAGE),
+            passes: Passes::new(device),
+            nothing: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("nothing"),
+                size: size_of::<u32>() as u64,
+                usage: wgpu::BufferUsages::STORAGE,
+                mapped_at_creation: false,
+            }),
             cloud: None,
+            has_compared: false,
             highlights: GrowingBuffer::new(device, "highlighted ranges"),
             spheres: GrowingBuffer::new(device, "spheres"),
-            targets: None,
-            bound: None,
+            canvas: None,
+            bindings_are_stale: false,
             drawn: None,
             geometry_is_stale: true,
             shade_is_stale: true,
@@ -182,7 +152,7 @@ impl SplatRenderer {
     /// Uploads a cloud of `n` points: positions in world space, unit normals, radii of the discs (world length).
     /// `normals` may be absent (points just read): then splats face the camera; so does a point whose normal is zero.
     /// `order` gives instance → index in `positions`, `normals`, `radii`; absent: as they are. All signs become 0 and
-    /// nothing is highlighted. O(n), parallel.
+    /// nothing is marked, highlighted or colored. O(n), parallel; uploads 17 bytes a point.
     ///
     /// # Errors
     /// [`RenderError::BufferTooLarge`], [`RenderError::TooManyPoints`], [`RenderError::OutOfMemory`], and
@@ -207,12 +177,12 @@ impl SplatRenderer {
     pub fn uploader(&self, device: &wgpu::Device) -> CloudUploader {
         CloudUploader {
             device: device.clone(),
-            layout: self.chunk_layout.clone(),
+            layout: self.passes.chunk_layout.clone(),
             max_chunk_points: self.max_chunk_points,
         }
     }
 
-    /// Draws `cloud` from now on, with all signs 0 and nothing highlighted. It comes from [`Self::uploader`]. O(1).
+    /// Draws `cloud` from now on, with all signs 0 and nothing marked, highlighted or colored. It comes from [`Self::uploader`]. O(1).
     pub fn show_cloud(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, cloud: UploadedCloud) {
         self.clear_cloud();
         self.set_highlight(device, queue, &[]);
@@ -223,56 +193,145 @@ impl SplatRenderer {
     /// Draws no cloud from now on.
     pub fn clear_cloud(&mut self) {
         self.cloud = None;
-        self.bound = None;
+        self.has_compared = false;
+        self.bindings_are_stale = true;
         self.geometry_is_stale = true;
     }
 
-    /// Toggles the sign of `ranges` of instances: uploads the words that hold them and no more.
+    /// Toggles the sign of `ranges` of instances: uploads the words (32 instances in 4 bytes) that hold them and no more
+    /// than a kilobyte between two of them.
     pub fn turn(&mut self, queue: &wgpu::Queue, ranges: &[Range<u32>]) {
+        self.toggle(queue, Flag::Turned, ranges);
+    }
+
+    /// Sets all signs from a bit per instance (words of 32, lowest first); words that are missing are 0. Compares and
+    /// uploads words as [`Self::turn`] does: O(n/32), bytes as what changes.
+    pub fn set_turned(&mut self, queue: &wgpu::Queue, words: &[u32]) {
+        self.set(queue, Flag::Turned, words);
+    }
+
+    /// Toggles whether `ranges` of instances are selected; uploads as [`Self::turn`].
+    pub fn select(&mut self, queue: &wgpu::Queue, ranges: &[Range<u32>]) {
+        self.toggle(queue, Flag::Selected, ranges);
+    }
+
+    /// Sets what is selected; words and upload as [`Self::set_turned`].
+    pub fn set_selected(&mut self, queue: &wgpu::Queue, words: &[u32]) {
+        self.set(queue, Flag::Selected, words);
+    }
+
+    /// Toggles whether `ranges` of instances are hidden: neither drawn nor picked. Uploads as [`Self::turn`].
+    pub fn hide(&mut self, queue: &wgpu::Queue, ranges: &[Range<u32>]) {
+        self.toggle(queue, Flag::Hidden, ranges);
+    }
+
+    /// Sets what is hidden; words and upload as [`Self::set_turned`].
+    pub fn set_hidden(&mut self, queue: &wgpu::Queue, words: &[u32]) {
+        self.set(queue, Flag::Hidden, words);
+    }
+
+    /// Toggles whether `ranges` of instances are marked as wrong, each by a small ball; uploads as [`Self::turn`].
+    pub fn mark_wrong(&mut self, queue: &wgpu::Queue, ranges: &[Range<u32>]) {
+        self.toggle(queue, Flag::Wrong, ranges);
+    }
+
+    /// Sets what is marked as wrong; words and upload as [`Self::set_turned`].
+    pub fn set_wrong(&mut self, queue: &wgpu::Queue, words: &[u32]) {
+        self.set(queue, Flag::Wrong, words);
+    }
+
+    /// The signs to compare with, as [`Self::set_turned`] takes the present ones, or none. They are shown where
+    /// [`DrawSettings::compare`] says.
+    pub fn set_compared(&mut self, queue: &wgpu::Queue, words: Option<&[u32]>) {
+        if let Some(words) = words {
+            self.set(queue, Flag::Compared, words);
+        }
+        let has_compared = words.is_some() && self.cloud.is_some();
+        self.shade_is_stale |= self.has_compared != has_compared;
+        self.has_compared = has_compared;
+    }
+
+    fn toggle(&mut self, queue: &wgpu::Queue, flag: Flag, ranges: &[Range<u32>]) {
         if let Some(cloud) = &mut self.cloud {
-            let bytes = cloud.turn(queue, ranges);
+            let bytes = cloud.flags.toggle(queue, flag, ranges);
+            self.flags_changed(flag, bytes);
+        }
+    }
+
+    fn set(&mut self, queue: &wgpu::Queue, flag: Flag, words: &[u32]) {
+        if let Some(cloud) = &mut self.cloud {
+            let bytes = cloud.flags.set(queue, flag, words);
+            self.flags_changed(flag, bytes);
+        }
+    }
+
+    fn flags_changed(&mut self, flag: Flag, bytes: u64) {
+        self.bytes_uploaded += bytes;
+        let changes_geometry = matches!(flag, Flag::Hidden | Flag::Wrong);
+        self.geometry_is_stale |= bytes > 0 && changes_geometry;
+        self.shade_is_stale |= bytes > 0;
+    }
+
+    /// Gives every instance a color for [`crate::DisplayMode::Colors`], or none: RGBA8 with red in the lowest byte,
+    /// gamma-encoded; alpha mixes it with the palette's color of surfaces, so 0 says that there is none. Uploads 4 bytes
+    /// a point.
+    ///
+    /// # Errors
+    /// [`RenderError::Mismatch`], [`RenderError::BufferTooLarge`] (above a fourth of the adapter's largest binding in
+    /// points) and [`RenderError::OutOfMemory`]; there are no colors then. All colors without a cloud are a mismatch.
+    pub fn set_colors(&mut self, device: &wgpu::Device, colors: Option<&[u32]>) -> Result<(), RenderError> {
+        let Some(cloud) = &mut self.cloud else {
+            return match colors {
+                Some(colors) if !colors.is_empty() => Err(RenderError::Mismatch {
+                    what: "colors of the points",
+                    expected: 0,
+                    found: colors.len(),
+                }),
+                _ => Ok(()),
+            };
+        };
+        self.bindings_are_stale = true;
+        self.shade_is_stale = true;
+        self.bytes_uploaded += cloud.set_colors(device, colors)?;
+        Ok(())
+    }
+
+    /// Replaces the colors of the instances from `first` on, as many as there are; nothing before [`Self::set_colors`].
+    /// Uploads 4 bytes for each.
+    pub fn update_colors(&mut self, queue: &wgpu::Queue, first: u32, colors: &[u32]) {
+        if let Some(cloud) = &self.cloud {
+            let bytes = cloud.update_colors(queue, first, colors);
             self.bytes_uploaded += bytes;
             self.shade_is_stale |= bytes > 0;
         }
     }
 
-    /// Sets all signs from a bit per instance (words of 32, lowest first); words that are missing are 0.
-    pub fn set_turned(&mut self, queue: &wgpu::Queue, words: &[u32]) {
-        if let Some(cloud) = &mut self.cloud {
-            self.bytes_uploaded += cloud.set_turned(queue, words);
-            self.shade_is_stale = true;
-        }
-    }
-
-    /// Highlights `ranges` of instances (ascending, disjoint); empty for none. Uploads the ranges only.
+    /// Highlights `ranges` of instances (ascending, disjoint); empty for none. Uploads 8 bytes a range.
     pub fn set_highlight(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, ranges: &[Range<u32>]) {
         let change = self.highlights.set(device, queue, highlight_words(ranges));
         self.shade_is_stale |= change.changed;
         self.bytes_uploaded += change.uploaded;
-        if change.replaced {
-            self.bound = None;
-        }
+        self.bindings_are_stale |= change.replaced;
     }
 
-    /// The spheres to draw, in the order that [`crate::Hit::Sphere`] counts.
+    /// The spheres to draw, in the order that [`crate::Hit::Sphere`] counts. Uploads 32 bytes a sphere, when any differs.
     pub fn set_spheres(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, spheres: &[Sphere]) {
         let change = self
             .spheres
             .set(device, queue, spheres.iter().map(SphereMark::from).collect());
         self.geometry_is_stale |= change.changed;
         self.bytes_uploaded += change.uploaded;
-        if change.replaced {
-            self.bound = None;
-        }
+        self.bindings_are_stale |= change.replaced;
     }
 
-    /// Bytes of cloud, signs, highlights and spheres uploaded since this renderer was made.
+    /// Bytes of cloud, flags, colors, highlights and spheres uploaded since this renderer was made.
     pub fn bytes_uploaded(&self) -> u64 {
         self.bytes_uploaded
     }
 
-    /// Draws if anything changed since the last call (camera, size, settings, cloud, signs, highlight, spheres); says
-    /// whether it did. `size` in physical pixels, brought within the device's limits; `pixels_per_point` scales lines
+    /// Draws if anything changed since the last call (camera, size, settings, cloud, flags, colors, highlight, spheres);
+    /// says whether it did. Uploads what the shaders are told of it, 600 bytes; no work on the CPU depends on the cloud.
+    /// `size` in physical pixels, brought within the device's limits; `pixels_per_point` scales lines
     /// and spheres.
     pub fn draw(
         &mut self,
@@ -285,113 +344,151 @@ impl SplatRenderer {
     ) -> bool {
         let largest = device.limits().max_texture_dimension_2d;
         let size = size.map(|len| len.clamp(1, largest));
-        let settings = DrawSettings {
-            stride: settings.stride.max(1),
-            ..*settings
-        };
-        let view = PictureView {
-            camera: *camera,
-            size,
-            scene: self.scene(&settings),
-        };
-        let drawn = Drawn {
-            view,
-            pixels_per_point,
-            settings,
-        };
+        let shot = self.shot(camera, size, pixels_per_point, settings);
         let draws_geometry =
-            self.geometry_is_stale || !self.drawn.is_some_and(|previous| previous.same_geometry(&drawn));
-        if !draws_geometry && !self.shade_is_stale && self.drawn == Some(drawn) {
+            self.geometry_is_stale || !self.drawn.is_some_and(|previous| previous.same_geometry(&shot));
+        if !draws_geometry && !self.shade_is_stale && self.drawn == Some(shot) {
             return false;
         }
 
-        if self.targets.as_ref().is_none_or(|targets| targets.size != size) {
-            self.targets = Some(Targets::new(device, size));
-            self.texture_number += 1;
-            self.bound = None;
-        }
-        let Some(targets) = &self.targets else { return false };
-        let (frame_group, shade_group) = self.bound.get_or_insert_with(|| {
-            let frame = device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("frame"),
-                layout: &self.frame_layout,
-                entries: &[
-                    wgpu::BindGroupEntry {
-                        binding: 0,
-                        resource: self.frame_buffer.as_entire_binding(),
-                    },
-                    wgpu::BindGroupEntry {
-                        binding: 1,
-                        resource: self.spheres.buffer().as_entire_binding(),
-                    },
-                ],
-            });
-            let signs = self.cloud.as_ref().map_or(&self.no_signs, CloudBuffers::turned_buffer);
-            let shade = self
-                .shade_pass
-                .bind(device, targets, &self.look_buffer, signs, self.highlights.buffer());
-            (frame, shade)
-        });
-
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("picture") });
-        if draws_geometry {
-            let max_radius = self.cloud.as_ref().map_or(0.0, CloudBuffers::max_radius);
-            queue.write_buffer(&self.frame_buffer, 0, bytemuck::bytes_of(&frame(&drawn, max_radius)));
-            let mut pass = targets.begin_geometry(&mut encoder);
-            pass.set_bind_group(0, &*frame_group, &[]);
-            if let Some(cloud) = &self.cloud {
-                pass.set_pipeline(&self.splat_pipeline);
-                cloud.draw(&mut pass, settings.stride);
+        let stage = self.stage();
+        let canvas = match self.canvas.take() {
+            Some(mut canvas) if canvas.targets().size == size => {
+                if self.bindings_are_stale {
+                    canvas.bind(device, &stage);
+                }
+                canvas
             }
-            if self.spheres.len() > 0 {
-                pass.set_pipeline(&self.sphere_pipeline);
-                pass.draw(0..3 * self.spheres.len(), 0..1);
+            _ => {
+                self.texture_number += 1;
+                Canvas::new(device, &stage, size)
             }
-        }
-        queue.write_buffer(
-            &self.look_buffer,
-            0,
-            bytemuck::bytes_of(&look(&settings, self.highlights.len())),
-        );
-        self.shade_pass.draw(&mut encoder, targets, frame_group, shade_group);
-        queue.submit([encoder.finish()]);
-
+        };
+        canvas.draw(device, queue, &stage, &shot, shot.whole(), draws_geometry);
+        self.canvas = Some(canvas);
+        self.bindings_are_stale = false;
         self.geometry_is_stale = false;
         self.shade_is_stale = false;
-        self.drawn = Some(drawn);
+        self.drawn = Some(shot);
         true
+    }
+
+    fn shot(&self, camera: &Camera, size: [u32; 2], pixels_per_point: f32, settings: &DrawSettings) -> Shot {
+        let view = PictureView {
+            camera: *camera,
+            size,
+            scene: self.scene(settings),
+        };
+        Shot {
+            view,
+            pixels_per_point,
+            transparent: false,
+            settings: *settings,
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        let cloud = self.cloud.as_ref();
+        let colors = cloud.and_then(CloudBuffers::colors);
+        Stage {
+            passes: self.passes.clone(),
+            chunks: cloud.map(|cloud| cloud.chunks().clone()),
+            max_radius: cloud.map_or(0.0, CloudBuffers::max_radius),
+            flags: cloud.map_or(&self.nothing, |cloud| cloud.flags.buffer()).clone(),
+            plane_words: cloud.map_or(0, |cloud| cloud.flags.plane_words()),
+            colors: colors.unwrap_or(&self.nothing).clone(),
+            highlights: self.highlights.buffer().clone(),
+            spheres: self.spheres.buffer().clone(),
+            n_spheres: self.spheres.len(),
+            has: Has {
+                n_highlights: self.highlights.len(),
+                colors: colors.is_some(),
+                compared: self.has_compared,
+            },
+        }
     }
 
     /// The picture of the last [`Self::draw`] (`Rgba8Unorm`, gamma-encoded), with a number that changes with the texture.
     pub fn picture(&self) -> Option<(&wgpu::TextureView, u64)> {
-        self.targets
+        self.canvas
             .as_ref()
-            .map(|targets| (&targets.picture_view, self.texture_number))
+            .map(|canvas| (&canvas.targets().picture_view, self.texture_number))
     }
 
     /// Reads back what the last picture shows at `pixel` (from the top left): the nearest in a small window wins, so a
     /// click never falls through a gap to the back. `None` before the first picture.
     pub fn pick(&self, device: &wgpu::Device, queue: &wgpu::Queue, pixel: [u32; 2]) -> Option<PickRequest> {
-        let (targets, drawn) = (self.targets.as_ref()?, self.drawn?);
-        Some(PickRequest::new(device, queue, &targets.seen, drawn.view, pixel))
+        let (canvas, drawn) = (self.canvas.as_ref()?, self.drawn?);
+        Some(PickRequest::new(
+            device,
+            queue,
+            &canvas.targets().seen,
+            drawn.view,
+            pixel,
+        ))
+    }
+
+    /// Reads back which instance the last picture shows at each pixel of a rectangle (`min` from the top left, `size` in
+    /// pixels; what lies outside of the picture is left out). `None` before the first picture and when nothing of the
+    /// rectangle lies inside. 8 bytes a pixel come back.
+    pub fn read_ids(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        min: [u32; 2],
+        size: [u32; 2],
+    ) -> Option<IdsRequest> {
+        let (canvas, drawn) = (self.canvas.as_ref()?, self.drawn?);
+        IdsRequest::new(device, queue, &canvas.targets().seen, drawn.view, min, size)
     }
 
     /// Reads the picture back as RGBA rows from the top, with its width and height; for screenshots and tests. Blocks.
     /// `None` before the first picture and when the device is lost.
     pub fn read_picture(&self, device: &wgpu::Device, queue: &wgpu::Queue) -> Option<([u32; 2], Vec<u8>)> {
-        let targets = self.targets.as_ref()?;
-        Some((
-            targets.size,
-            read_texture(device, queue, &targets.picture, targets.size, 4)?,
-        ))
+        let targets = self.canvas.as_ref()?.targets();
+        let (picture, size) = (&targets.picture, targets.size);
+        let read_back = ReadBack::new(device, queue, picture, UVec2::ZERO, size.into(), COLOR_BYTES);
+        read_back.wait(device);
+        let mut rgba = Vec::new();
+        read_back
+            .rows(|row| rgba.extend_from_slice(row))
+            .then_some((size, rgba))
+    }
+
+    /// What draws a picture of `size` pixels, beside the window's and without changing it, in this thread or another:
+    /// see [`PictureMaker::make`]. `pixels_per_point` scales lines and spheres, `transparent` leaves the background out.
+    /// O(1).
+    #[expect(clippy::too_many_arguments, reason = "those of draw, and one more")]
+    pub fn picture_maker(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        camera: &Camera,
+        size: [u32; 2],
+        pixels_per_point: f32,
+        settings: &DrawSettings,
+        transparent: bool,
+    ) -> PictureMaker {
+        PictureMaker {
+            device: device.clone(),
+            queue: queue.clone(),
+            stage: self.stage(),
+            shot: Shot {
+                transparent,
+                ..self.shot(camera, size, pixels_per_point, settings)
+            },
+            max_tile_side: PictureMaker::tile_side(device),
+        }
     }
 
     /// Reads ids and depth bits back; for tests.
     #[cfg(test)]
     pub(crate) fn read_seen(&self, device: &wgpu::Device, queue: &wgpu::Queue) -> Option<Vec<[u32; 2]>> {
-        let targets = self.targets.as_ref()?;
-        let bytes = read_texture(device, queue, &targets.seen, targets.size, 8)?;
-        Some(bytes.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect())
+        let targets = self.canvas.as_ref()?.targets();
+        let (seen, size) = (&targets.seen, targets.size.into());
+        let read_back = ReadBack::new(device, queue, seen, UVec2::ZERO, size, SEEN_BYTES);
+        read_back.wait(device);
+        Some(read_back.pixels())
     }
 
     /// A ball around everything drawn.
@@ -416,98 +513,4 @@ impl SplatRenderer {
             ..scene
         }
     }
-}
-
-/// Factor on the radii of splats; those of a thinned cloud grow to cover as much.
-fn radius_scale(settings: &DrawSettings) -> f32 {
-    settings.splat_scale * (settings.stride as f32).sqrt()
-}
-
-fn frame(drawn: &Drawn, max_radius: f32) -> Frame {
-    let PictureView { camera, size, scene } = drawn.view;
-    let size = UVec2::from(size).as_vec2();
-    let is_perspective = camera.projection == Projection::Perspective;
-    let center = (camera.eye() - scene.center).dot(camera.back());
-    Frame {
-        clip_from_eye: camera.clip_from_view(size.x / size.y, scene) * Mat4::from_mat3(camera.view_rotation()),
-        eye: camera.eye(),
-        perspective: if is_perspective { 1.0 } else { 0.0 },
-        right: camera.right(),
-        pixel_len: camera.pixel_len(1.0, size),
-        back: camera.back(),
-        max_radius: max_radius * radius_scale(&drawn.settings),
-        depth_from_clip: camera.depth_from_clip(scene),
-        scene_depth: Vec2::new(center - scene.radius, center + scene.radius),
-        size,
-        pivot_depth: camera.distance,
-        sphere_radius: SPHERE_RADIUS * drawn.pixels_per_point,
-        line_width: drawn.pixels_per_point,
-        stride: drawn.settings.stride,
-    }
-}
-
-fn look(settings: &DrawSettings, n_highlights: u32) -> Look {
-    let palette = &settings.palette;
-    Look {
-        front: palette.front.into(),
-        mode: settings.mode.code(),
-        back: palette.back.into(),
-        n_highlights,
-        background: palette.background.into(),
-        pad_0: 0,
-        highlight: palette.highlight.into(),
-        pad_1: 0,
-    }
-}
-
-/// Rows of a texture from the top, without padding. Blocks; `None` when the device is lost.
-fn read_texture(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    texture: &wgpu::Texture,
-    [width, height]: [u32; 2],
-    pixel_bytes: u32,
-) -> Option<Vec<u8>> {
-    let row_bytes = width * pixel_bytes;
-    let padded = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("read back"),
-        size: u64::from(padded) * u64::from(height),
-        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-        mapped_at_creation: false,
-    });
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-        label: Some("read back"),
-    });
-    encoder.copy_texture_to_buffer(
-        texture.as_image_copy(),
-        wgpu::TexelCopyBufferInfo {
-            buffer: &buffer,
-            layout: wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(padded),
-                rows_per_image: None,
-            },
-        },
-        wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        },
-    );
-    queue.submit([encoder.finish()]);
-    buffer.map_async(wgpu::MapMode::Read, .., |result| {
-        if let Err(error) = result {
-            tracing::warn!("reading a picture back: {error}");
-        }
-    });
-    device.poll(wgpu::PollType::wait_indefinitely()).ok()?;
-    let bytes = buffer.get_mapped_range(..).ok()?;
-    Some(
-        bytes
-            .chunks(padded as usize)
-            .flat_map(|row| &row[..row_bytes as usize])
-            .copied()
-            .collect(),
-    )
 }

@@ -1,4 +1,5 @@
-//! Every shader: the only place that includes WGSL. `common.wgsl` comes first in each.
+//! Every shader: the only place that includes WGSL. `common.wgsl` comes first in each, then `points.wgsl` in those that go
+//! through points.
 
 use egui_wgpu::wgpu;
 
@@ -15,6 +16,7 @@ pub const SPLAT: Shader = Shader {
     name: "splat",
     source: concat!(
         include_str!("../../../shaders/common.wgsl"),
+        include_str!("../../../shaders/points.wgsl"),
         include_str!("../../../shaders/splat.wgsl")
     ),
 };
@@ -24,6 +26,15 @@ pub const SPHERE: Shader = Shader {
     source: concat!(
         include_str!("../../../shaders/common.wgsl"),
         include_str!("../../../shaders/sphere.wgsl")
+    ),
+};
+/// Normals as lines.
+pub const HAIR: Shader = Shader {
+    name: "hair",
+    source: concat!(
+        include_str!("../../../shaders/common.wgsl"),
+        include_str!("../../../shaders/points.wgsl"),
+        include_str!("../../../shaders/hair.wgsl")
     ),
 };
 /// Ids and depths to colors.

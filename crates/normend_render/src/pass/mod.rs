@@ -1,10 +1,14 @@
-//! The passes of a picture: splats and spheres leave ids, depths and surfaces in [`Targets`]; shading makes colors of them.
+//! The passes of a picture: splats and spheres leave ids, depths and surfaces in [`Targets`]; shading makes colors of
+//! them; hair is drawn over it all, hidden by the same depths.
 
+mod hair;
 pub mod shade;
-pub mod sphere;
-pub mod splat;
+mod sphere;
+mod splat;
 
 use egui_wgpu::wgpu;
+
+use crate::pass::shade::ShadePass;
 
 /// Id and clip-space depth of what is seen. Not the depth texture itself and not a float texture: the one cannot be
 /// read on OpenGL, the other cannot be drawn to.
@@ -15,6 +19,46 @@ pub const SURFACE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Gamma-encoded colors, as egui takes them.
 pub const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// All pipelines, and the layouts of the bind groups that several of them share.
+#[derive(Clone)]
+pub struct Passes {
+    /// Group 0 of every pass: frame, spheres, flags, look.
+    pub frame_layout: wgpu::BindGroupLayout,
+    /// Group 1 of the passes that go through points: a chunk of them.
+    pub chunk_layout: wgpu::BindGroupLayout,
+    /// Discs.
+    pub splat: wgpu::RenderPipeline,
+    /// Spheres.
+    pub sphere: wgpu::RenderPipeline,
+    /// Colors.
+    pub shade: ShadePass,
+    /// Normals as lines.
+    pub hair: wgpu::RenderPipeline,
+}
+
+impl Passes {
+    /// Compiles everything.
+    pub fn new(device: &wgpu::Device) -> Self {
+        use wgpu::BufferBindingType::{Storage, Uniform};
+        let storage = Storage { read_only: true };
+        let chunk_layout = buffers(device, "chunk", wgpu::ShaderStages::VERTEX, &[Uniform, storage]);
+        let frame_layout = buffers(
+            device,
+            "frame",
+            wgpu::ShaderStages::VERTEX_FRAGMENT,
+            &[Uniform, storage, storage, Uniform],
+        );
+        Self {
+            splat: splat::pipeline(device, &frame_layout, &chunk_layout),
+            sphere: sphere::pipeline(device, &frame_layout),
+            shade: ShadePass::new(device, &frame_layout),
+            hair: hair::pipeline(device, &frame_layout, &chunk_layout),
+            chunk_layout,
+            frame_layout,
+        }
+    }
+}
 
 /// The textures of one picture size.
 pub struct Targets {
@@ -70,8 +114,8 @@ impl Targets {
         }
     }
 
-    /// Begins the geometry pass: everything cleared to background.
-    pub fn begin_geometry<'a>(&self, encoder: &'a mut wgpu::CommandEncoder) -> wgpu::RenderPass<'a> {
+    /// Begins the geometry pass: everything cleared to background. `keeps_depth` for hair after it.
+    pub fn begin_geometry<'a>(&self, encoder: &'a mut wgpu::CommandEncoder, keeps_depth: bool) -> wgpu::RenderPass<'a> {
         let cleared = |view| {
             Some(wgpu::RenderPassColorAttachment {
                 view,
@@ -90,8 +134,37 @@ impl Targets {
                 view: &self.depth_view,
                 depth_ops: Some(wgpu::Operations {
                     load: wgpu::LoadOp::Clear(0.0),
-                    store: wgpu::StoreOp::Discard,
+                    store: if keeps_depth {
+                        wgpu::StoreOp::Store
+                    } else {
+                        wgpu::StoreOp::Discard
+                    },
                 }),
+                stencil_ops: None,
+            }),
+            timestamp_writes: None,
+            occlusion_query_set: None,
+            multiview_mask: None,
+        })
+    }
+
+    /// Begins the pass of the hair, over the finished picture.
+    pub fn begin_hair<'a>(&self, encoder: &'a mut wgpu::CommandEncoder) -> wgpu::RenderPass<'a> {
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("hair"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &self.picture_view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Load,
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.depth_view,
+                // Read only: a turn draws the hair anew before the depths of the same geometry.
+                depth_ops: None,
                 stencil_ops: None,
             }),
             timestamp_writes: None,
@@ -107,6 +180,19 @@ fn geometry_pipeline(
     label: &str,
     module: &wgpu::ShaderModule,
     layouts: &[Option<&wgpu::BindGroupLayout>],
+) -> wgpu::RenderPipeline {
+    let targets = [Some(SEEN_FORMAT.into()), Some(SURFACE_FORMAT.into())];
+    depth_tested_pipeline(device, label, module, layouts, &targets, true)
+}
+
+/// A pipeline whose triangles nearer ones hide.
+fn depth_tested_pipeline(
+    device: &wgpu::Device,
+    label: &str,
+    module: &wgpu::ShaderModule,
+    layouts: &[Option<&wgpu::BindGroupLayout>],
+    targets: &[Option<wgpu::ColorTargetState>],
+    writes_depth: bool,
 ) -> wgpu::RenderPipeline {
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(label),
@@ -125,7 +211,7 @@ fn geometry_pipeline(
         primitive: wgpu::PrimitiveState::default(),
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH_FORMAT,
-            depth_write_enabled: Some(true),
+            depth_write_enabled: Some(writes_depth),
             depth_compare: Some(wgpu::CompareFunction::Greater),
             stencil: wgpu::StencilState::default(),
             bias: wgpu::DepthBiasState::default(),
@@ -135,34 +221,35 @@ fn geometry_pipeline(
             module,
             entry_point: Some("fragment"),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
-            targets: &[Some(SEEN_FORMAT.into()), Some(SURFACE_FORMAT.into())],
+            targets,
         }),
         multiview_mask: None,
         cache: None,
     })
 }
 
-/// The layout of a bind group with a uniform buffer at 0 and a read-only storage buffer at 1.
-pub fn uniform_and_storage(
+/// The layout of a bind group of buffers, bound in this order.
+fn buffers(
     device: &wgpu::Device,
     label: &str,
     visibility: wgpu::ShaderStages,
+    types: &[wgpu::BufferBindingType],
 ) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility,
-        ty: wgpu::BindingType::Buffer {
-            ty,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
-        count: None,
-    };
+    let entries: Vec<wgpu::BindGroupLayoutEntry> = (0_u32..)
+        .zip(types)
+        .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility,
+            ty: wgpu::BindingType::Buffer {
+                ty,
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        })
+        .collect();
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some(label),
-        entries: &[
-            entry(0, wgpu::BufferBindingType::Uniform),
-            entry(1, wgpu::BufferBindingType::Storage { read_only: true }),
-        ],
+        entries: &entries,
     })
 }

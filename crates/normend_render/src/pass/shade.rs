@@ -1,4 +1,4 @@
-//! Shade pass: one triangle over the whole picture, colors from ids, surfaces, signs and highlights.
+//! Shade pass: one triangle over the whole picture, colors from ids, surfaces, flags and highlights.
 
 use egui_wgpu::wgpu;
 
@@ -6,6 +6,7 @@ use crate::pass::{PICTURE_FORMAT, Targets};
 use crate::shader;
 
 /// The shade pipeline and the layout of its own bind group (group 1; group 0 is the frame).
+#[derive(Clone)]
 pub struct ShadePass {
     pipeline: wgpu::RenderPipeline,
     layout: wgpu::BindGroupLayout,
@@ -20,12 +21,11 @@ impl ShadePass {
             ty,
             count: None,
         };
-        let buffer = |ty| wgpu::BindingType::Buffer {
-            ty,
+        let storage = wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Storage { read_only: true },
             has_dynamic_offset: false,
             min_binding_size: None,
         };
-        let storage = buffer(wgpu::BufferBindingType::Storage { read_only: true });
         let texture = wgpu::BindingType::Texture {
             sample_type: wgpu::TextureSampleType::Uint,
             view_dimension: wgpu::TextureViewDimension::D2,
@@ -34,11 +34,10 @@ impl ShadePass {
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("shade"),
             entries: &[
-                entry(0, buffer(wgpu::BufferBindingType::Uniform)),
+                entry(0, storage),
                 entry(1, storage),
-                entry(2, storage),
+                entry(2, texture),
                 entry(3, texture),
-                entry(4, texture),
             ],
         });
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -76,9 +75,8 @@ impl ShadePass {
         &self,
         device: &wgpu::Device,
         targets: &Targets,
-        look: &wgpu::Buffer,
-        turned: &wgpu::Buffer,
         highlights: &wgpu::Buffer,
+        colors: &wgpu::Buffer,
     ) -> wgpu::BindGroup {
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("shade"),
@@ -86,22 +84,18 @@ impl ShadePass {
             entries: &[
                 wgpu::BindGroupEntry {
                     binding: 0,
-                    resource: look.as_entire_binding(),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: turned.as_entire_binding(),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 2,
                     resource: highlights.as_entire_binding(),
                 },
                 wgpu::BindGroupEntry {
-                    binding: 3,
+                    binding: 1,
+                    resource: colors.as_entire_binding(),
+                },
+                wgpu::BindGroupEntry {
+                    binding: 2,
                     resource: wgpu::BindingResource::TextureView(&targets.seen_view),
                 },
                 wgpu::BindGroupEntry {
-                    binding: 4,
+                    binding: 3,
                     resource: wgpu::BindingResource::TextureView(&targets.surface_view),
                 },
             ],

@@ -373,12 +373,12 @@ fn limits_of_the_adapter_are_kept_by_chunks_or_told_in_words() {
     let Some(mut scene) = Scene::new(&cloud) else { return };
     let whole = scene.shoot();
     let mut descriptor = SplatRenderer::device_descriptor(&scene.gpu.adapter);
-    descriptor.required_limits.max_storage_buffer_binding_size = 256;
+    descriptor.required_limits.max_storage_buffer_binding_size = 1_280;
     let (device, queue) = pollster::block_on(scene.gpu.adapter.request_device(&descriptor)).unwrap();
     scene.renderer = SplatRenderer::new(&device);
     (scene.gpu.device, scene.gpu.queue) = (device, queue);
     let HeadlessDevice { device, queue, .. } = &scene.gpu;
-    // 16 points fit into a binding, and the signs of 2048.
+    // 80 points fit into a binding, and the five bits of 2048.
     let Cloud {
         positions,
         normals,
@@ -394,7 +394,7 @@ fn limits_of_the_adapter_are_kept_by_chunks_or_told_in_words() {
         .renderer
         .set_cloud(device, queue, &[Vec3::ZERO; 2_049], None, &[1.0; 2_049], None)
         .unwrap_err();
-    let expect = "signs of the points: 260 bytes are needed in one buffer, and this graphics adapter allows 256; open fewer points";
+    let expect = "signs and marks of the points: 1300 bytes are needed in one buffer, and this graphics adapter allows 1280; open fewer points";
     assert_eq!(error.to_string(), expect);
     assert_eq!(scene.shoot().splats().count(), 0);
 }

@@ -6,10 +6,10 @@ use egui_wgpu::wgpu::naga;
 
 use crate::DisplayMode;
 use crate::gpu_types::{Chunk, Frame, Look, Point, SphereMark};
-use crate::shader::{SHADE, SPHERE, SPLAT, Shader};
+use crate::shader::{HAIR, SHADE, SPHERE, SPLAT, Shader};
 
 /// All shaders: the tests below go through them.
-const SHADERS: [Shader; 3] = [SPLAT, SPHERE, SHADE];
+const SHADERS: [Shader; 4] = [SPLAT, SPHERE, SHADE, HAIR];
 
 /// A struct: its name, its size, its fields with their offsets.
 type Layout = (String, usize, Vec<(String, usize)>);
@@ -27,8 +27,11 @@ macro_rules! twin {
 fn twins() -> Vec<Layout> {
     vec![
         twin!(Frame: clip_from_eye, eye, perspective, right, pixel_len, back, max_radius, depth_from_clip,
-              scene_depth, size, pivot_depth, sphere_radius, line_width, stride),
-        twin!(Look: front, mode, back, n_highlights, background, pad_0, highlight, pad_1),
+              scene_depth, size, pivot_depth, sphere_radius, line_width, stride, clip_min, near_depth, clip_max,
+              plane_words, section, section_offset, origin, whole, section_half, ball_radius, pad_0, pad_1),
+        twin!(Look: front, mode, back, n_highlights, background, transparent, highlight, eye_dome, selected,
+              dim_unselected, surface, split, wrong, has_colors, hair, hair_len, hair_every, hair_in_pixels,
+              hair_by_side, pad_0),
         twin!(Chunk: first, pad_0, pad_1, pad_2),
         twin!(Point: position, packed),
         twin!(SphereMark: center, selected, color, pad_0),
@@ -86,7 +89,7 @@ fn every_file_of_the_folder_is_tested() {
         .collect();
     names.sort();
     let mut expect: Vec<String> = SHADERS.iter().map(|shader| format!("{}.wgsl", shader.name)).collect();
-    expect.push("common.wgsl".to_owned());
+    expect.extend(["common.wgsl", "points.wgsl"].map(str::to_owned));
     expect.sort();
     assert_eq!(names, expect);
 }
@@ -117,7 +120,18 @@ fn constants_match() {
     check("NO_NORMAL", f64::from(rust::NO_NORMAL));
     check("RADIUS_CODE_MAX", f64::from(rust::RADIUS_CODE_MAX));
     check("RADIUS_CODES_PER_OCTAVE", f64::from(rust::RADIUS_CODES_PER_OCTAVE));
-    assert_eq!(literal(&shade, "MODE_NORMALS"), f64::from(DisplayMode::Normals.code()));
+    check("FLAG_TURNED", f64::from(rust::Flag::Turned as u32));
+    check("FLAG_SELECTED", f64::from(rust::Flag::Selected as u32));
+    check("FLAG_HIDDEN", f64::from(rust::Flag::Hidden as u32));
+    check("FLAG_COMPARED", f64::from(rust::Flag::Compared as u32));
+    check("FLAG_WRONG", f64::from(rust::Flag::Wrong as u32));
+    for (name, mode) in [
+        ("MODE_LIT", DisplayMode::Lit),
+        ("MODE_NORMALS", DisplayMode::Normals),
+        ("MODE_COLORS", DisplayMode::Colors),
+    ] {
+        assert_eq!(literal(&shade, name), f64::from(mode.code()));
+    }
 }
 
 #[test]
