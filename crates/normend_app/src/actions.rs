@@ -7,11 +7,14 @@ use normend_render::DisplayMode;
 
 use crate::app::{App, Leaving};
 use crate::command::{Action, Command};
+use crate::crash;
 use crate::dialogs::{DialogAnswer, DialogPurpose};
 use crate::job::JobError;
 use crate::panels::export::ExportWindow;
 use crate::panels::modal::Modal;
 use crate::panels::open_path::OpenPathWindow;
+use crate::panels::palette::PaletteWindow;
+use crate::panels::preferences::next_scale;
 use crate::panels::status_bar;
 use crate::scene_sync::Scene;
 use crate::session::Session;
@@ -22,6 +25,8 @@ use crate::work::{ScanOrigin, Uploaded, Work};
 const ZOOM_STEP: f32 = 1.25;
 /// Pointer motion that one press of an arrow key stands for, in points.
 const ORBIT_STEP: f32 = 24.0;
+/// As above, with Shift.
+const PAN_STEP: f32 = 40.0;
 const SPLAT_STEP: f32 = 1.15;
 
 impl App {
@@ -71,7 +76,8 @@ impl App {
                 "there are no sources",
             ),
             Command::FlipSources | Command::RemoveSources => check(n_selected > 0, "no source is selected"),
-            Command::FrameAll
+            Command::Frame
+            | Command::FrameAll
             | Command::SetPivot
             | Command::ViewFront
             | Command::ViewBack
@@ -87,10 +93,31 @@ impl App {
             | Command::OrbitRight
             | Command::OrbitUp
             | Command::OrbitDown
+            | Command::PanLeft
+            | Command::PanRight
+            | Command::PanUp
+            | Command::PanDown
+            | Command::Fly
+            | Command::ClipBox
+            | Command::CutDeeper
+            | Command::CutLess
             | Command::LargerSplats
             | Command::SmallerSplats
             | Command::NextDisplayMode => check(document.is_some(), "no scan is open"),
-            Command::Quit | Command::Cancel | Command::Shortcuts | Command::Log | Command::About => Ok(()),
+            Command::ShowHints => check(
+                !self.settings.settings.dismissed_hints.is_empty(),
+                "no hint was dismissed yet",
+            ),
+            Command::Quit
+            | Command::Cancel
+            | Command::LargerInterface
+            | Command::SmallerInterface
+            | Command::UsualInterface
+            | Command::Preferences
+            | Command::Palette
+            | Command::Shortcuts
+            | Command::Log
+            | Command::About => Ok(()),
         }
     }
 
@@ -106,21 +133,24 @@ impl App {
                 }
             },
             Action::OpenScan(path) => self.leave(Leaving::Open(ScanOrigin::File(path))),
+            Action::Display(mode) => self.mode = mode,
             Action::ClearRecent => self.settings.settings.recent.clear(),
             Action::Propagate(parameters) => {
                 if let Some(session) = &mut self.session {
                     session.draft = parameters;
                     session.requested = parameters;
                     let uploader = self.scene.as_ref().map(Scene::uploader);
-                    self.work = Some(Work::propagate(&self.ctx, &session.document, parameters, uploader));
+                    let work = Work::propagate(&self.ctx, &session.document, parameters, true, uploader);
+                    self.work = Some(work);
                 }
             }
+            Action::GoToStep(n_steps) => self.go_to_step(n_steps),
             Action::SelectSource { point, extend } => self.select(point, extend),
             Action::FlyTo(point) => {
                 if let Some(cloud) = self.document().map(|document| document.cloud().clone())
                     && let Some(&position) = cloud.positions().get(point as usize)
                 {
-                    self.viewport.fly_to(position, cloud.diagonal() * 0.25);
+                    self.viewport.fly_to(position, cloud.diagonal() * 0.25, None);
                 }
             }
             Action::FlipSources(points) => self.apply_edit(Edit::FlipSources(points)),
@@ -191,6 +221,7 @@ impl App {
                 }
             }
             Command::Cancel => self.cancel(),
+            Command::Frame => self.frame(),
             Command::FrameAll => {
                 if let Some(session) = &self.session {
                     self.viewport.frame_all(session.document.cloud());
@@ -204,7 +235,7 @@ impl App {
             | Command::ViewBottom
             | Command::ViewCorner => {
                 if let Some(view) = command.standard_view() {
-                    self.viewport.camera.set_view(view);
+                    self.viewport.look_along(view);
                 }
             }
             Command::ToggleOrthographic => self.viewport.toggle_orthographic(),
@@ -214,6 +245,14 @@ impl App {
             Command::OrbitRight => self.viewport.orbit(egui::Vec2::new(ORBIT_STEP, 0.0)),
             Command::OrbitUp => self.viewport.orbit(egui::Vec2::new(0.0, -ORBIT_STEP)),
             Command::OrbitDown => self.viewport.orbit(egui::Vec2::new(0.0, ORBIT_STEP)),
+            Command::PanLeft => self.viewport.pan(egui::Vec2::new(-PAN_STEP, 0.0)),
+            Command::PanRight => self.viewport.pan(egui::Vec2::new(PAN_STEP, 0.0)),
+            Command::PanUp => self.viewport.pan(egui::Vec2::new(0.0, -PAN_STEP)),
+            Command::PanDown => self.viewport.pan(egui::Vec2::new(0.0, PAN_STEP)),
+            Command::Fly => self.viewport.toggle_fly(),
+            Command::ClipBox => self.viewport.toggle_clip_box(),
+            Command::CutDeeper => self.viewport.cut_deeper(1.0),
+            Command::CutLess => self.viewport.cut_deeper(-1.0),
             Command::LargerSplats => self.scale_splats(SPLAT_STEP),
             Command::SmallerSplats => self.scale_splats(1.0 / SPLAT_STEP),
             Command::NextDisplayMode => {
@@ -221,7 +260,19 @@ impl App {
                 let at = all.iter().position(|&mode| mode == self.mode).unwrap_or_default();
                 self.mode = all[(at + 1) % all.len()];
             }
-            Command::Shortcuts => self.windows.shortcuts = !self.windows.shortcuts,
+            Command::LargerInterface => self.scale_interface(true),
+            Command::SmallerInterface => self.scale_interface(false),
+            Command::UsualInterface => self.settings.settings.ui_scale = 1.0,
+            Command::Preferences => {
+                self.windows.preferences = !self.windows.preferences;
+                self.windows.preferences_view.rest();
+            }
+            Command::Palette => self.windows.modal = Some(Modal::Palette(PaletteWindow::default())),
+            Command::ShowHints => self.settings.settings.dismissed_hints.clear(),
+            Command::Shortcuts => {
+                let is_open = self.windows.shortcuts.is_some();
+                self.windows.shortcuts = (!is_open).then(String::new);
+            }
             Command::Log => self.windows.log = !self.windows.log,
             Command::About => self.windows.about = !self.windows.about,
         }
@@ -235,9 +286,27 @@ impl App {
         }
     }
 
+    /// Shows what is selected, or else the whole scan.
+    fn frame(&mut self) {
+        let Some(session) = &self.session else { return };
+        let cloud = session.document.cloud();
+        if session.selected.is_empty() {
+            self.viewport.frame_all(cloud);
+        } else {
+            let points = session.selected.iter();
+            self.viewport
+                .frame_points(points.map(|&point| cloud.positions()[point as usize]));
+        }
+    }
+
     fn scale_splats(&mut self, factor: f32) {
         let scale = &mut self.settings.settings.splat_scale;
         *scale = (*scale * factor).clamp(*SPLAT_SCALES.start(), *SPLAT_SCALES.end());
+    }
+
+    fn scale_interface(&mut self, larger: bool) {
+        let scale = &mut self.settings.settings.ui_scale;
+        *scale = next_scale(*scale, larger);
     }
 
     /// Escape: the first of these that applies.
@@ -247,8 +316,9 @@ impl App {
             if matches!(modal, Modal::Export(_)) {
                 self.after_export = None;
             }
-        } else if windows.shortcuts || windows.about || windows.log {
-            (windows.shortcuts, windows.about, windows.log) = (false, false, false);
+        } else if windows.close() {
+        } else if self.viewport.cancel() {
+            // It was something in the view.
         } else if let Some(work) = &self.work {
             work.cancel();
         } else {
@@ -306,6 +376,45 @@ impl App {
             && let Some(scene) = &mut self.scene
         {
             scene.apply(&change, session);
+        }
+    }
+
+    /// Takes steps back, or does them again, until so many are done.
+    fn go_to_step(&mut self, n_steps: usize) {
+        loop {
+            let n_done = self.document().map_or(n_steps, Document::n_done);
+            let n_known = self.document().map_or(n_steps, |document| document.steps().count());
+            match n_done.cmp(&n_steps.min(n_known)) {
+                std::cmp::Ordering::Less => self.step_history(Session::redo),
+                std::cmp::Ordering::Equal => return,
+                std::cmp::Ordering::Greater => self.step_history(Session::undo),
+            }
+        }
+    }
+
+    /// Orients again when the document wants other parameters than those in force, as after they were taken back.
+    pub(crate) fn keep_oriented(&mut self) {
+        let Some(session) = &mut self.session else { return };
+        let wanted = session.document.parameters();
+        let Some(in_force) = session.document.propagation().map(|propagation| propagation.parameters) else {
+            return;
+        };
+        match &self.work {
+            None if wanted != in_force && wanted != session.requested => {}
+            // The running one is for parameters that were taken back meanwhile.
+            Some(Work::Propagate {
+                parameters,
+                is_asked: false,
+                ..
+            }) if *parameters != wanted => {}
+            _ => return,
+        }
+        (session.draft, session.requested) = (wanted, wanted);
+        self.work = None;
+        if wanted != in_force {
+            let uploader = self.scene.as_ref().map(Scene::uploader);
+            let work = Work::propagate(&self.ctx, &session.document, wanted, false, uploader);
+            self.work = Some(work);
         }
     }
 
@@ -372,36 +481,37 @@ impl App {
                     self.say_why(&format!("{} was not opened", theme::elided(&origin.name(), 48)), error)
                 }
             },
-            Some(Work::Propagate(job)) => match job.poll() {
-                None => self.work = Some(Work::Propagate(job)),
+            Some(Work::Propagate {
+                job,
+                parameters,
+                is_asked,
+            }) => match job.poll() {
+                None => {
+                    self.work = Some(Work::Propagate {
+                        job,
+                        parameters,
+                        is_asked,
+                    });
+                }
                 Some(Ok(propagation)) => self.install(propagation),
                 Some(Err(error)) => {
                     self.say_why("The scan was not oriented", error);
                     if let Some(session) = &mut self.session
-                        && session.document.propagation().is_some()
+                        && is_asked
+                        && let Some(propagation) = session.document.propagation()
                     {
-                        session.requested = session.document.parameters();
+                        session.requested = propagation.parameters;
                     }
                 }
             },
-            Some(Work::Export {
-                job,
-                path,
-                revision,
-                parameters,
-            }) => match job.poll() {
+            Some(Work::Export { job, path, revision }) => match job.poll() {
                 None => {
-                    self.work = Some(Work::Export {
-                        job,
-                        path,
-                        revision,
-                        parameters,
-                    });
+                    self.work = Some(Work::Export { job, path, revision });
                 }
                 Some(Ok(())) => {
                     self.settings.settings.remember_folder(Purpose::Export, &path);
                     if let Some(session) = &mut self.session {
-                        session.mark_saved(revision, parameters);
+                        session.mark_saved(revision);
                         let n_points = theme::counted(session.scan.cloud.n_points() as u64, "point", "points");
                         self.messages
                             .info(format!("Exported {n_points} to {}.", path.display()));
@@ -461,6 +571,7 @@ impl App {
             ));
         }
         let parameters = session.draft;
+        crash::set_scan(session.scan.path().map(std::path::PathBuf::as_path));
         self.session = Some(session);
         self.act(Action::Propagate(parameters));
     }

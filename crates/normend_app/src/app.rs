@@ -7,32 +7,24 @@ use egui::{CentralPanel, Panel, ScrollArea, Ui};
 use normend_core::{Document, Edit};
 use normend_render::{DisplayMode, DrawSettings, SplatRenderer};
 
-use crate::command::{Action, Command, take_shortcuts};
+use crate::command::{Action, Command, Keymap, take_shortcuts};
+use crate::crash;
 use crate::dialogs::Dialogs;
 use crate::messages::Messages;
 use crate::panels::modal::Modal;
-use crate::panels::{
-    about, empty, export, menu_bar, messages, open_path, progress, shortcuts, side, status_bar, unsaved,
-};
+use crate::panels::side::SideTab;
+use crate::panels::{empty, hints, history, menu_bar, messages, orient, progress, side, sources, status_bar, view};
+use crate::popup_keys;
+use crate::run;
 use crate::scene_sync::{Scene, Target};
 use crate::session::Session;
-use crate::run;
 use crate::settings::{SettingsStore, WindowPlace};
 use crate::theme;
 use crate::tools::mend::MendTool;
 use crate::tools::{Tool, ToolEvent};
 use crate::viewport::{Pixel, Viewport};
+use crate::windows::Windows;
 use crate::work::{ScanOrigin, Work};
-
-/// The windows over the editor; `None` or `false` is closed.
-#[derive(Default)]
-pub(crate) struct Windows {
-    /// While it is open, nothing else acts.
-    pub(crate) modal: Option<Modal>,
-    pub(crate) shortcuts: bool,
-    pub(crate) log: bool,
-    pub(crate) about: bool,
-}
 
 /// A step that leaves the present document behind.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -96,6 +88,11 @@ impl App {
         let (sender, gpu_errors) = mpsc::channel();
         let (scene, adapter) = match &cc.wgpu_render_state {
             Some(state) => {
+                let ctx = cc.egui_ctx.clone();
+                state.device.set_device_lost_callback(move |_, reason| {
+                    crash::set_lost(&reason);
+                    ctx.request_repaint();
+                });
                 let ctx = cc.egui_ctx.clone();
                 state.device.on_uncaptured_error(std::sync::Arc::new(move |error| {
                     // The editor may be gone; then nobody needs the message.
@@ -172,6 +169,21 @@ impl App {
         self.mend.level()
     }
 
+    /// Where the 3D view is seen from.
+    pub fn camera(&self) -> &normend_render::Camera {
+        self.viewport.camera()
+    }
+
+    /// What is cut away in the 3D view.
+    pub fn clip(&self) -> &normend_render::Clip {
+        &self.viewport.clip
+    }
+
+    /// How the scan is colored.
+    pub fn display_mode(&self) -> DisplayMode {
+        self.mode
+    }
+
     /// The 3D view's place in the window, in points.
     pub fn view_rect(&self) -> egui::Rect {
         self.viewport.rect
@@ -233,11 +245,17 @@ impl App {
     }
 
     fn take_keys(&mut self) {
+        let keys = &mut self.settings.settings.keys;
+        if self.windows.preferences && self.windows.preferences_view.take_key(&self.ctx, keys) {
+            return;
+        }
         // An open menu or list has the keyboard: Escape closes it, arrows move in it.
         if egui::Popup::is_any_open(&self.ctx) {
+            popup_keys::move_focus(&self.ctx);
             return;
         }
         if self.windows.modal.is_some() {
+            self.viewport.take_keys(&self.ctx, true);
             let escape = |input: &mut egui::InputState| input.consume_key(egui::Modifiers::NONE, egui::Key::Escape);
             if self.ctx.input_mut(escape) {
                 self.act(Command::Cancel.into());
@@ -247,6 +265,7 @@ impl App {
         let typing = self.ctx.text_edit_focused();
         let focused = self.ctx.memory(|memory| memory.focused());
         let widget_focused = focused.is_some() && focused != self.viewport.id();
+        self.viewport.take_keys(&self.ctx, typing);
         for command in take_shortcuts(&self.ctx, typing, widget_focused) {
             self.act(command.into());
         }
@@ -261,12 +280,10 @@ impl App {
         });
         Panel::top("toolbar").frame(frame).show(ui, |ui| {
             let document = self.document();
-            let undo = document.and_then(Document::next_undo).map(|edit| edit.label());
-            let redo = document.and_then(Document::next_redo).map(|edit| edit.label());
+            let undo = document.and_then(Document::next_undo).map(|step| step.kind().label());
+            let redo = document.and_then(Document::next_redo).map(|step| step.kind().label());
             let availability = |command| self.availability(command);
-            // Without a scan there is nothing for a tool to do.
-            let tool = self.session.as_ref().map(|_| self.tool);
-            if let Some(chosen) = menu_bar::toolbar(ui, &availability, undo, redo, tool) {
+            if let Some(chosen) = menu_bar::toolbar(ui, &availability, undo, redo) {
                 action = Some(chosen);
             }
         });
@@ -276,6 +293,7 @@ impl App {
                 self.session.as_ref(),
                 self.mend.n_would_turn(),
                 self.mend.level(),
+                self.session.as_ref().map(|_| self.tool),
                 &self.adapter,
             );
         });
@@ -284,7 +302,7 @@ impl App {
 
     fn side_panel(&mut self, ui: &mut Ui) -> Option<Action> {
         let blocked = self.availability(Command::Propagate).err();
-        let propagating = matches!(self.work, Some(Work::Propagate(_)));
+        let propagating = matches!(self.work, Some(Work::Propagate { .. }));
         let session = self.session.as_mut()?;
         let settings = &mut self.settings.settings;
         let palette = theme::palette(settings.palette, ui.visuals().dark_mode);
@@ -301,8 +319,20 @@ impl App {
                     .auto_shrink([false, false])
                     .show(ui, |ui| {
                         // The same with and without the bar.
-                        ui.set_max_width(theme::SIDE_PANEL_WIDTH - 2.0 * theme::SPACE_M - theme::SCROLL_WIDTH);
-                        side::ui(ui, session, settings, mode, &palette, propagating, blocked)
+                        ui.set_max_width(theme::SIDE_CONTENT_WIDTH);
+                        side::tabs(ui, &mut settings.side_tab);
+                        match settings.side_tab {
+                            SideTab::Orient => orient::ui(ui, session, propagating, blocked),
+                            SideTab::Sources => {
+                                let list = |ui: &mut Ui| sources::ui(ui, session);
+                                theme::section_about(ui, "Sources", sources::ABOUT, list)
+                            }
+                            SideTab::View => {
+                                view::ui(ui, settings, mode, &palette);
+                                None
+                            }
+                            SideTab::History => history::ui(ui, session),
+                        }
                     })
                     .inner
             })
@@ -335,6 +365,9 @@ impl App {
             return;
         };
         let under_pointer = self.mend.target().map(|target| target.position());
+        let preferences = &self.settings.settings;
+        self.viewport
+            .set_preferences(preferences.navigation, preferences.reduce_motion);
         let pointer = self.viewport.ui(ui, scene, draw_settings, under_pointer);
         self.settings.settings.splat_scale = draw_settings.splat_scale.clamp(
             *crate::settings::SPLAT_SCALES.start(),
@@ -404,7 +437,7 @@ impl App {
             Some(ToolEvent::Edit(edit)) => self.apply_click(edit),
             Some(ToolEvent::SelectSource { point, extend }) => self.act(Action::SelectSource { point, extend }),
             Some(ToolEvent::Deselect) => self.deselect(),
-            Some(ToolEvent::Pivot(point)) => self.viewport.camera.set_pivot(point),
+            Some(ToolEvent::Pivot(point)) => self.viewport.set_pivot(point),
         }
     }
 
@@ -427,6 +460,7 @@ impl App {
         if !self.windows.log {
             messages::toasts(ui, area, &mut self.messages);
         }
+        self.show_hint(ui, area);
         if ui.input(|input| !input.raw.hovered_files.is_empty()) {
             let painter = ui
                 .ctx()
@@ -440,57 +474,21 @@ impl App {
         }
     }
 
-    fn show_modal(&mut self, ui: &Ui) {
-        // What is decided may open the next window, so this one is closed first and put back while it waits.
-        match self.windows.modal.take() {
-            None => {}
-            Some(Modal::OpenPath(mut window)) => match window.ui(ui) {
-                open_path::Decision::Wait => self.windows.modal = Some(Modal::OpenPath(window)),
-                open_path::Decision::Close => {}
-                open_path::Decision::Open(path) => self.act(Action::OpenScan(path)),
-            },
-            Some(Modal::Export(mut window)) => match window.ui(ui) {
-                export::Decision::Wait => self.windows.modal = Some(Modal::Export(window)),
-                export::Decision::Close => self.after_export = None,
-                export::Decision::Browse => {
-                    self.windows.modal = Some(Modal::Export(window));
-                    self.act(Action::BrowseExport);
-                }
-                export::Decision::Export { path, overwrite_input } => {
-                    self.act(Action::ExportTo { path, overwrite_input });
-                }
-            },
-            Some(Modal::Unsaved(leaving)) => {
-                let session = self.session.as_ref();
-                let name = session.map_or("this scan", |session| &session.name);
-                let mends = session.is_none_or(Session::has_unsaved_mends);
-                match unsaved::ui(ui, name, mends) {
-                    unsaved::Decision::Wait => self.windows.modal = Some(Modal::Unsaved(leaving)),
-                    unsaved::Decision::Export => {
-                        self.act(Command::Export.into());
-                        match &self.windows.modal {
-                            Some(Modal::Export(_)) => self.after_export = Some(leaving),
-                            _ => self.windows.modal = Some(Modal::Unsaved(leaving)),
-                        }
-                    }
-                    unsaved::Decision::Discard => self.leave_now(leaving),
-                    unsaved::Decision::Cancel => {}
-                }
-            }
+    /// The hint that is due, if any; what the user has done by himself needs no hint any more.
+    fn show_hint(&mut self, ui: &Ui, area: egui::Rect) {
+        let document = self.document();
+        let propagation = document.and_then(Document::propagation);
+        let progress = hints::Progress {
+            is_oriented: propagation.is_some() && self.work.is_none(),
+            is_mended: document.and_then(Document::next_undo).is_some(),
+            has_patches: propagation.is_some_and(|propagation| propagation.patches.is_some()),
+        };
+        let dismissed = &mut self.settings.settings.dismissed_hints;
+        if let Some(card) = hints::due(dismissed, progress)
+            && hints::ui(ui, area, card)
+        {
+            dismissed.insert(card.name().to_owned());
         }
-    }
-
-    fn show_windows(&mut self, ui: &Ui) {
-        if self.windows.shortcuts {
-            shortcuts::ui(ui, &mut self.windows.shortcuts);
-        }
-        if self.windows.log {
-            messages::log(ui, &mut self.windows.log, &self.messages);
-        }
-        if self.windows.about {
-            about::ui(ui, &mut self.windows.about, &self.adapter);
-        }
-        self.show_modal(ui);
     }
 
     fn answer_close_request(&mut self) {
@@ -521,9 +519,20 @@ impl App {
         }
     }
 
+    fn save_settings(&mut self) {
+        self.settings.settings.window = self.window_place;
+        if let Err(problem) = self.settings.save_if_changed() {
+            tracing::warn!("{problem}");
+        }
+    }
+
     fn keep_settings(&mut self) {
         self.ctx.set_theme(self.settings.settings.theme.preference());
         self.ctx.set_zoom_factor(self.settings.settings.ui_scale);
+        let keys = &self.settings.settings.keys;
+        if *Keymap::of(&self.ctx) != *keys {
+            keys.clone().install(&self.ctx);
+        }
         let pressed = self.ctx.input(|input| input.pointer.any_down());
         // Not in the middle of a drag: a slider would write the file with every step.
         if !pressed && let Err(problem) = self.settings.save_if_changed() {
@@ -534,10 +543,16 @@ impl App {
 
 impl eframe::App for App {
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        if crash::lost().is_some() {
+            // What the user set is kept; the edits are with the journal.
+            self.save_settings();
+            crash::leave_lost();
+        }
         self.window_place = run::window_place(ui.ctx(), self.window_place);
         self.take_gpu_errors();
         self.take_dialogs();
         self.take_work();
+        self.keep_oriented();
         self.take_drops();
         self.take_keys();
         self.answer_close_request();
@@ -559,9 +574,6 @@ impl eframe::App for App {
     }
 
     fn on_exit(&mut self) {
-        self.settings.settings.window = self.window_place;
-        if let Err(problem) = self.settings.save_if_changed() {
-            tracing::warn!("{problem}");
-        }
+        self.save_settings();
     }
 }

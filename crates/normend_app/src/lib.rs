@@ -8,12 +8,14 @@
 mod actions;
 pub mod app;
 pub mod command;
+pub mod crash;
 mod dialogs;
 pub mod folders;
 pub mod job;
 pub mod messages;
 mod pace;
 pub mod panels;
+mod popup_keys;
 mod run;
 pub mod scene_sync;
 pub mod session;
@@ -21,6 +23,7 @@ pub mod settings;
 pub mod theme;
 pub mod tools;
 pub mod viewport;
+mod windows;
 mod work;
 
 pub use app::App;

@@ -1,5 +1,7 @@
 //! What the editor has to say: shown for a while over the view, kept in the log.
 
+use crate::crash;
+
 /// How important a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
@@ -20,6 +22,8 @@ pub struct Message {
     pub text: String,
     /// When it was said last, in seconds since the editor started.
     pub at_secs: f64,
+    /// When it was said last.
+    pub at: jiff::Timestamp,
     /// How often it was said in a row.
     pub n_times: u32,
     /// Seconds since the editor started at which it leaves the view; `None` once it has left.
@@ -37,6 +41,37 @@ const MAX_ENTRIES: usize = 300;
 const INFO_SECS: f64 = 7.0;
 const ERROR_SECS: f64 = 30.0;
 const MAX_SHOWN_ERRORS: usize = 2;
+
+impl Level {
+    /// All levels, from the least important.
+    pub const ALL: [Self; 3] = [Self::Done, Self::Note, Self::Error];
+
+    /// The name in the list of messages.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Done => "Done",
+            Self::Note => "Note",
+            Self::Error => "Error",
+        }
+    }
+}
+
+impl Message {
+    /// The text, with how often it was said.
+    pub fn full_text(&self) -> String {
+        if self.n_times > 1 {
+            format!("{} (×{})", self.text, self.n_times)
+        } else {
+            self.text.clone()
+        }
+    }
+
+    /// The time of day on this machine, as "14:03:59".
+    pub fn clock(&self) -> String {
+        let local = self.at.to_zoned(jiff::tz::TimeZone::system());
+        local.strftime("%H:%M:%S").to_string()
+    }
+}
 
 impl Messages {
     /// Says that something was done.
@@ -68,12 +103,14 @@ impl Messages {
     }
 
     fn push(&mut self, level: Level, text: String, shown_until: Option<f64>) {
+        crash::remember(&text);
         if let Some(last) = self.entries.last_mut()
             && last.level == level
             && last.text == text
         {
             last.n_times += 1;
             last.at_secs = self.now;
+            last.at = jiff::Timestamp::now();
             last.shown_until = shown_until;
             return;
         }
@@ -84,6 +121,7 @@ impl Messages {
             level,
             text,
             at_secs: self.now,
+            at: jiff::Timestamp::now(),
             n_times: 1,
             shown_until,
         });
@@ -113,6 +151,11 @@ impl Messages {
     /// All that are kept, oldest first.
     pub fn entries(&self) -> &[Message] {
         &self.entries
+    }
+
+    /// Forgets all that was said.
+    pub(crate) fn clear(&mut self) {
+        self.entries.clear();
     }
 
     pub(crate) fn entries_mut(&mut self) -> &mut [Message] {

@@ -9,41 +9,91 @@ use eframe::egui_wgpu::{WgpuConfiguration, WgpuSetupCreateNew};
 use normend_render::SplatRenderer;
 
 use crate::app::App;
+use crate::crash::{self, DeviceLost};
 use crate::settings::{SettingsStore, WindowPlace};
 
 const MIN_SIZE: [f32; 2] = [900.0, 600.0];
+
+/// What the panic hook saw of the first panic of the window's thread.
+#[derive(Default)]
+struct Seen {
+    panic: Option<String>,
+    report: Option<PathBuf>,
+    /// The graphics device was lost: whether the editor came up again.
+    restarted: Option<Result<(), String>>,
+}
 
 /// Opens the editor's window, with `scan` when one is given, and runs until it is closed.
 ///
 /// # Errors
 /// In words for the user: no display, no graphics driver, and the package that gives it.
 pub fn run(scan: Option<PathBuf>) -> anyhow::Result<()> {
-    let (settings, problem) = SettingsStore::load();
+    let (mut settings, problem) = SettingsStore::load();
+    let news = crash::news(&settings.settings.told_crash).map(|(name, path)| {
+        settings.settings.told_crash = name;
+        path
+    });
     let options = options(settings.settings.window);
     // Missing libraries of the window system are panics of its bindings; they become words like all other errors.
-    let last_panic = Arc::new(Mutex::new(None));
-    let seen = Arc::clone(&last_panic);
+    let seen = Arc::new(Mutex::new(Seen::default()));
     let former_hook = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |info| {
-        *seen.lock().unwrap_or_else(PoisonError::into_inner) = Some(info.to_string());
-    }));
+    let hook_seen = Arc::clone(&seen);
+    std::panic::set_hook(Box::new(move |info| see(&hook_seen, &info.to_string())));
     let outcome = catch_unwind(AssertUnwindSafe(|| {
         eframe::run_native(
             "Normend",
             options,
-            Box::new(move |cc| Ok(Box::new(App::with_settings(cc, scan, settings, problem)))),
+            Box::new(move |cc| {
+                let mut app = App::with_settings(cc, scan, settings, problem);
+                app.say_what_happened(news);
+                Ok(Box::new(app))
+            }),
         )
     }));
     std::panic::set_hook(former_hook);
-    match outcome {
-        Ok(Ok(())) => Ok(()),
-        Ok(Err(error)) => Err(anyhow!(in_words(&error.to_string()))),
-        Err(_) => {
-            let panic = last_panic.lock().unwrap_or_else(PoisonError::into_inner).take();
-            Err(anyhow!(in_words(
-                &panic.unwrap_or_else(|| "no reason given".to_owned())
-            )))
+    let panic = match outcome {
+        Ok(Ok(())) => return Ok(()),
+        Ok(Err(error)) => return Err(anyhow!(in_words(&error.to_string()))),
+        Err(panic) => panic,
+    };
+    let mut seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
+    // The editor leaves by itself when it hears of the loss, else egui stops at it.
+    let restarted = match panic.downcast::<DeviceLost>() {
+        Ok(lost) => Some(lost.restarted),
+        Err(_) => seen.restarted.take(),
+    };
+    match restarted {
+        Some(Ok(())) => {
+            tracing::warn!("the graphics device was lost; the editor starts again with the open scan");
+            Ok(())
         }
+        Some(Err(reason)) => Err(anyhow!(
+            "The graphics device was lost and the editor had to stop; {reason}. Open the scan again."
+        )),
+        None => {
+            let panic = seen.panic.take();
+            let mut words = in_words(&panic.unwrap_or_else(|| "no reason given".to_owned()));
+            if let Some(report) = &seen.report {
+                words += &format!("\nA report is at {}", report.display());
+            }
+            Err(anyhow!(words))
+        }
+    }
+}
+
+/// What the panic hook does: jobs turn their own panics into messages, the window's thread is done for.
+fn see(seen: &Mutex<Seen>, panic: &str) {
+    tracing::error!("{panic}");
+    let mut seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
+    if std::thread::current().name() != Some("main") || seen.panic.is_some() {
+        return;
+    }
+    seen.panic = Some(panic.to_owned());
+    if crash::is_loss(panic) {
+        // At once: giving up what belonged to the device may stop the process.
+        seen.restarted = Some(crash::restart());
+    } else {
+        seen.report = crash::report(panic);
     }
 }
 

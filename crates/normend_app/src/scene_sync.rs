@@ -11,7 +11,8 @@ use egui::TextureId;
 use glam::Vec3;
 use normend_core::{Change, PointCloud, Propagation, SpanningTree};
 use normend_render::{
-    Camera, CloudUploader, DrawSettings, Hit, PickRequest, RenderError, Sphere, SplatRenderer, UploadedCloud, wgpu,
+    Camera, Clip, CloudUploader, DrawSettings, Hit, PickRequest, RenderError, Sphere, SplatRenderer, UploadedCloud,
+    wgpu,
 };
 
 use crate::session::Session;
@@ -53,6 +54,7 @@ struct Geometry {
     pixels_per_point: f32,
     splat_scale: f32,
     stride: u32,
+    clip: Clip,
 }
 
 /// The renderer, its texture, and what it shows.
@@ -230,6 +232,7 @@ impl Scene {
             pixels_per_point,
             splat_scale: settings.splat_scale,
             stride: settings.stride,
+            clip: settings.clip,
         };
         if self.geometry != Some(geometry) {
             self.geometry = Some(geometry);

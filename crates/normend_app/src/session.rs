@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use normend_core::{Change, Document, Edit, EditError, Parameters, Propagation, SpanningTree, Start};
+use normend_core::document::Step;
+use normend_core::{Change, Document, Edit, EditError, EditKind, Parameters, Propagation, SpanningTree, Start};
 use normend_io::Scan;
 
 /// An open scan.
@@ -28,8 +29,6 @@ pub struct Session {
     /// Components whose right side nothing tells but a source of the user, ascending, as indices of the tree's roots.
     undecided: Vec<usize>,
     saved_revision: u64,
-    /// As exported last, or of the first propagation; `None` before that.
-    saved_parameters: Option<Parameters>,
 }
 
 impl Session {
@@ -45,6 +44,7 @@ impl Session {
             },
             ..Parameters::default()
         };
+        let document = Document::new(Arc::clone(&scan.cloud), scan.given_normals.clone()).with_parameters(parameters);
         let n_points = scan.cloud.n_points();
         let n_without_normal = scan.given_normals.as_ref().map_or(n_points, |normals| {
             normals.iter().filter(|&&normal| normal == glam::Vec3::ZERO).count()
@@ -53,8 +53,7 @@ impl Session {
             reveal: None,
             n_without_normal,
             undecided: Vec::new(),
-            saved_revision: document.revision(),
-            saved_parameters: None,
+            saved_revision: document.signs_revision(),
             scan: Arc::new(scan),
             name,
             document,
@@ -64,25 +63,20 @@ impl Session {
         }
     }
 
-    /// Whether there are mends, or another propagation than the first, that no exported file has.
+    /// Whether there are mends, or other parameters than the first, that no exported file has.
     pub fn is_unsaved(&self) -> bool {
-        self.has_unsaved_mends() || self.has_unsaved_propagation()
+        self.document.signs_revision() != self.saved_revision
     }
 
-    /// Whether there are mends that no exported file has.
+    /// Whether there are mends among what is unsaved; else other parameters alone.
     pub fn has_unsaved_mends(&self) -> bool {
-        self.document.revision() != self.saved_revision
+        let mends = |step: &Step| step.change().is_of_signs() && step.kind() != EditKind::SetParameters;
+        self.is_unsaved() && self.document.steps().take(self.document.n_done()).any(mends)
     }
 
-    fn has_unsaved_propagation(&self) -> bool {
-        self.saved_parameters
-            .is_some_and(|saved| saved != self.document.parameters())
-    }
-
-    /// Remembers that the sources of `revision` with `parameters` are in an exported file.
-    pub fn mark_saved(&mut self, revision: u64, parameters: Parameters) {
+    /// Remembers that the signs of `revision` are in an exported file.
+    pub fn mark_saved(&mut self, revision: u64) {
         self.saved_revision = revision;
-        self.saved_parameters = Some(parameters);
     }
 
     /// Makes a propagation the one in force. The first is what the file is without the user, so it is nothing to lose.
@@ -94,9 +88,11 @@ impl Session {
             .filter(|(component, side)| side.rule.is_none() && !voted.contains(component))
             .map(|(component, _)| component)
             .collect();
+        self.requested = propagation.parameters;
+        // What was asked for is a step of the history from now on; the first parameters are none.
+        // It names no points, so it cannot be refused.
+        drop(self.document.apply(Edit::SetParameters(self.requested)));
         self.document.install(propagation);
-        self.requested = self.document.parameters();
-        self.saved_parameters.get_or_insert(self.requested);
     }
 
     /// How many components could face either way: nothing tells their right side, and the user has not said it.

@@ -81,17 +81,22 @@ pub enum Work {
         origin: ScanOrigin,
     },
     /// The open scan is oriented.
-    Propagate(Job<Uploaded<Propagation>>),
+    Propagate {
+        /// The orienting.
+        job: Job<Uploaded<Propagation>>,
+        /// With these parameters.
+        parameters: Parameters,
+        /// The user asked for it; else the document does, after parameters were taken back.
+        is_asked: bool,
+    },
     /// The open scan is written.
     Export {
         /// The writing.
         job: Job<()>,
         /// Where to.
         path: PathBuf,
-        /// The document's revision that is written.
+        /// The revision of the document's signs that is written.
         revision: u64,
-        /// The parameters that it was propagated with.
-        parameters: Parameters,
     },
 }
 
@@ -120,11 +125,12 @@ impl Work {
         ctx: &egui::Context,
         document: &Document,
         parameters: Parameters,
+        is_asked: bool,
         uploader: Option<CloudUploader>,
     ) -> Self {
         let cloud: Arc<PointCloud> = Arc::clone(document.cloud());
         let given = document.given_normals().cloned();
-        Self::Propagate(Job::start(ctx, "propagate", "Finding neighbors", move |progress| {
+        let job = Job::start(ctx, "propagate", "Finding neighbors", move |progress| {
             let given = given.as_ref().map(|normals| normals.as_slice());
             let propagation = Propagation::new(&cloud, given, parameters, progress)?;
             progress.stage("Preparing the picture");
@@ -133,7 +139,12 @@ impl Work {
                 result: propagation,
                 cloud: uploaded,
             })
-        }))
+        });
+        Self::Propagate {
+            job,
+            parameters,
+            is_asked,
+        }
     }
 
     /// Starts to write the oriented scan; `None` when it is not oriented yet.
@@ -155,8 +166,7 @@ impl Work {
         Some(Self::Export {
             job,
             path: path.to_path_buf(),
-            revision: session.document.revision(),
-            parameters: session.document.parameters(),
+            revision: session.document.signs_revision(),
         })
     }
 
@@ -164,7 +174,7 @@ impl Work {
     pub fn title(&self) -> String {
         match self {
             Self::Open { origin, .. } => format!("Opening {}", theme::elided(&origin.name(), MAX_NAME)),
-            Self::Propagate(_) => "Orienting normals".to_owned(),
+            Self::Propagate { .. } => "Orienting normals".to_owned(),
             Self::Export { path, .. } => {
                 let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
                 format!("Exporting {}", theme::elided(&name, MAX_NAME))
@@ -176,7 +186,7 @@ impl Work {
     pub fn status(&self) -> JobStatus {
         match self {
             Self::Open { job, .. } => job.status(),
-            Self::Propagate(job) => job.status(),
+            Self::Propagate { job, .. } => job.status(),
             Self::Export { job, .. } => job.status(),
         }
     }
@@ -185,7 +195,7 @@ impl Work {
     pub fn cancel(&self) {
         match self {
             Self::Open { job, .. } => job.cancel(),
-            Self::Propagate(job) => job.cancel(),
+            Self::Propagate { job, .. } => job.cancel(),
             Self::Export { job, .. } => job.cancel(),
         }
     }

@@ -6,7 +6,7 @@ mod table;
 use std::path::PathBuf;
 
 use normend_core::Parameters;
-use normend_render::StandardView;
+use normend_render::{DisplayMode, StandardView};
 
 pub use keys::{Keymap, MOUSE, shortcut_text, take_shortcuts};
 pub use table::Command;
@@ -20,8 +20,12 @@ pub enum Action {
     OpenScan(PathBuf),
     /// Forget the recent scans.
     ClearRecent,
+    /// Color the splats this way.
+    Display(DisplayMode),
     /// Propagate again with these parameters; the sources stay.
     Propagate(Parameters),
+    /// Take steps back, or do them again, until so many are done.
+    GoToStep(usize),
     /// Select the source at this point; `extend` keeps the others.
     SelectSource {
         /// The point's id.

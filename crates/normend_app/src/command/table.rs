@@ -79,6 +79,7 @@ commands! {
     Undo: Edit 0, "Undo", "Take the last edit back", [ctrl(Key::Z)];
     Redo: Edit 0, "Redo", "Apply the last undone edit again", [ctrl_shift(Key::Z), ctrl(Key::Y)];
     Cancel: Edit 1, "Cancel", "Close what is open, stop the running work, or deselect", [key(Key::Escape)];
+    Preferences: Edit 9, "Preferences…", "Change the look and the keys", [ctrl(Key::Comma)];
 
     // Select.
     SelectAllSources: Select 0, "Select all sources", "Select every source", [ctrl(Key::A)];
@@ -98,15 +99,16 @@ commands! {
     Propagate: Mend 3, "Propagate", "Orient again with the parameters of the panel; sources stay", [ctrl(Key::Enter)];
 
     // View.
-    FrameAll: View 0, "Frame all", "Show the whole scan", [key(Key::F)];
+    Frame: View 0, "Frame", "Show what is selected, or else the whole scan", [key(Key::F)];
+    FrameAll: View 0, "Frame all", "Show the whole scan", [key(Key::Home)];
     SetPivot: View 0, "Turn around this point",
         "Make the point under the pointer the pivot of the view (or double-click it)", [key(Key::Period)];
-    ViewFront: View 1, "Front", "Look along +y", [key(Key::Num1)];
-    ViewBack: View 1, "Back", "Look along −y", [ctrl(Key::Num1)];
-    ViewRight: View 1, "Right", "Look along −x", [key(Key::Num3)];
-    ViewLeft: View 1, "Left", "Look along +x", [ctrl(Key::Num3)];
-    ViewTop: View 1, "Top", "Look along −z", [key(Key::Num7)];
-    ViewBottom: View 1, "Bottom", "Look along +z", [ctrl(Key::Num7)];
+    ViewFront: View 1, "Front", "Look from the front: along +y where z is up", [key(Key::Num1)];
+    ViewBack: View 1, "Back", "Look from behind: along −y where z is up", [ctrl(Key::Num1)];
+    ViewRight: View 1, "Right", "Look from the right: along −x where z is up", [key(Key::Num3)];
+    ViewLeft: View 1, "Left", "Look from the left: along +x where z is up", [ctrl(Key::Num3)];
+    ViewTop: View 1, "Top", "Look from above, along the up axis", [key(Key::Num7)];
+    ViewBottom: View 1, "Bottom", "Look from below, along the up axis", [ctrl(Key::Num7)];
     ViewCorner: View 1, "Corner", "Look from the front, the right and above", [key(Key::Num9)];
     ToggleOrthographic: View 2, "Parallel projection",
         "Switch between parallel and perspective projection", [key(Key::Num5)];
@@ -116,12 +118,27 @@ commands! {
     OrbitRight: View 4, "Orbit right", "Turn the view to the right (or drag)", [key(Key::ArrowRight)];
     OrbitUp: View 4, "Orbit up", "Turn the view upward (or drag)", [key(Key::ArrowUp)];
     OrbitDown: View 4, "Orbit down", "Turn the view downward (or drag)", [key(Key::ArrowDown)];
-    LargerSplats: View 5, "Larger splats", "Draw larger splats", [key(Key::Plus), key(Key::Equals)];
-    SmallerSplats: View 5, "Smaller splats", "Draw smaller splats", [key(Key::Minus)];
-    NextDisplayMode: View 5, "Next display mode", "Color the splats in the next way", [key(Key::D)];
+    PanLeft: View 5, "Pan left", "Move the picture to the left (or drag with the right button)", [shift(Key::ArrowLeft)];
+    PanRight: View 5, "Pan right", "Move the picture to the right (or drag with the right button)", [shift(Key::ArrowRight)];
+    PanUp: View 5, "Pan up", "Move the picture up (or drag with the right button)", [shift(Key::ArrowUp)];
+    PanDown: View 5, "Pan down", "Move the picture down (or drag with the right button)", [shift(Key::ArrowDown)];
+    Fly: View 6, "Fly", "Fly through the scan with W A S D, Q and E; again or Escape ends it", [shift(Key::F)];
+    ClipBox: View 6, "Clip box", "Show only what is inside a box with handles on its faces, or everything again", [shift(Key::B)];
+    CutDeeper: View 6, "Cut deeper", "Cut away more of what is near (or Ctrl and the wheel)", [shift(Key::PageUp)];
+    CutLess: View 6, "Cut less", "Cut away less of what is near (or Ctrl and the wheel)", [shift(Key::PageDown)];
+    LargerSplats: View 7, "Larger splats", "Draw larger splats", [key(Key::Plus), key(Key::Equals)];
+    SmallerSplats: View 7, "Smaller splats", "Draw smaller splats", [key(Key::Minus)];
+    NextDisplayMode: View 7, "Next display mode", "Color the splats in the next way", [key(Key::D)];
+    LargerInterface: View 9, "Larger interface", "Make text and buttons larger",
+        [ctrl(Key::Plus), ctrl(Key::Equals)];
+    SmallerInterface: View 9, "Smaller interface", "Make text and buttons smaller", [ctrl(Key::Minus)];
+    UsualInterface: View 9, "Usual interface size", "Text and buttons as they were at first", [ctrl(Key::Num0)];
 
     // Help.
+    Palette: Help 0, "Find a command…", "Find a command, a recent scan or a display mode by a few letters",
+        [ctrl(Key::P)];
     Shortcuts: Help 0, "Keys and mouse", "Show what every key and button does", [key(Key::F1), key(Key::Questionmark)];
     Log: Help 0, "Messages", "Show all messages of this run", [key(Key::F2)];
-    About: Help 1, "About Normend", "Version and graphics adapter", [];
+    ShowHints: Help 1, "Show hints again", "Let the hints for the first steps come again", [];
+    About: Help 2, "About Normend", "Version and graphics adapter", [];
 }

@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
-use egui::{Button, RichText, Ui};
+use egui::{Button, Ui};
 
 use super::Availability;
 use crate::command::{Action, Command, Menu};
 use crate::theme::{self, SPACE_S, SPACE_XS};
-use crate::tools::Tool;
 
 /// The menu bar. `recent` are the scans opened last.
 pub fn menus(ui: &mut Ui, availability: &Availability<'_>, recent: &[PathBuf]) -> Option<Action> {
@@ -75,14 +74,8 @@ fn recent_menu(ui: &mut Ui, recent: &[PathBuf]) -> Option<Action> {
     action
 }
 
-/// The toolbar: the commands used most, and what the tool does. `undo` and `redo` name the edits that would be undone and redone.
-pub fn toolbar(
-    ui: &mut Ui,
-    availability: &Availability<'_>,
-    undo: Option<&str>,
-    redo: Option<&str>,
-    tool: Option<Tool>,
-) -> Option<Action> {
+/// The toolbar: the commands used most. `undo` and `redo` name the edits that would be undone and redone.
+pub fn toolbar(ui: &mut Ui, availability: &Availability<'_>, undo: Option<&str>, redo: Option<&str>) -> Option<Action> {
     let mut action = None;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = SPACE_XS;
@@ -100,11 +93,10 @@ pub fn toolbar(
             }
             let available = availability(command);
             let response = ui.add_enabled(available.is_ok(), Button::new(command.label()));
-            let keys = command.keys_text(ui.ctx());
-            let tooltip = match of {
-                Some(edit) => format!("{}: {edit} ({keys})", command.tooltip()),
-                None => format!("{} ({keys})", command.tooltip()),
-            };
+            let mut tooltip = command.tooltip_with_keys(ui.ctx());
+            if let Some(edit) = of {
+                tooltip = format!("{edit}: {tooltip}");
+            }
             let clicked = match available {
                 Ok(()) => response.on_hover_text(tooltip).clicked(),
                 Err(reason) => response.on_disabled_hover_text(reason).clicked(),
@@ -112,10 +104,6 @@ pub fn toolbar(
             if clicked {
                 action = Some(command.into());
             }
-        }
-        if let Some(tool) = tool {
-            divider(ui);
-            ui.add(egui::Label::new(RichText::new(tool.hint()).weak()).truncate());
         }
     });
     action

@@ -5,16 +5,23 @@ use crate::command::Command;
 pub mod about;
 pub mod empty;
 pub mod export;
+pub mod hints;
+pub mod history;
 pub mod menu_bar;
 pub mod messages;
 pub(crate) mod modal;
+pub mod navigation;
 pub mod open_path;
+pub mod orient;
+pub mod palette;
+pub mod preferences;
 pub mod progress;
 pub mod shortcuts;
 pub mod side;
 pub mod sources;
 pub mod status_bar;
 pub mod unsaved;
+pub mod view;
 
 /// Says whether a command can be run now, and if not, why.
 pub type Availability<'a> = dyn Fn(Command) -> Result<(), &'static str> + 'a;

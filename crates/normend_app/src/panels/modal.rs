@@ -4,6 +4,7 @@ use egui::{Id, Key, RichText, Ui};
 
 use super::export::ExportWindow;
 use super::open_path::OpenPathWindow;
+use super::palette::PaletteWindow;
 use crate::app::Leaving;
 use crate::theme::{SPACE_L, SPACE_S};
 
@@ -14,6 +15,8 @@ pub(crate) enum Modal {
     Export(ExportWindow),
     /// Which scan to open.
     OpenPath(OpenPathWindow),
+    /// What to do, found by a few letters.
+    Palette(PaletteWindow),
     /// Whether mends may be lost.
     Unsaved(Leaving),
 }

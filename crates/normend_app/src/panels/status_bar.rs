@@ -1,9 +1,12 @@
-//! One line about the scan, what a click would turn, and the graphics adapter.
+//! One line on how the tool is used; one about the scan, what a click would turn, and the graphics adapter.
 
+use egui::text::{LayoutJob, TextFormat};
 use egui::{Align, Layout, RichText, Ui};
 
+use crate::command::Command;
 use crate::session::Session;
 use crate::theme::{self, SPACE_M};
+use crate::tools::Tool;
 
 /// The status bar. `level` says which of the offered patches a click would turn, and of how many.
 pub fn ui(
@@ -11,8 +14,12 @@ pub fn ui(
     session: Option<&Session>,
     n_would_turn: Option<u64>,
     level: Option<(usize, usize)>,
+    tool: Option<Tool>,
     adapter: &str,
 ) {
+    if let Some(tool) = tool {
+        hint_line(ui, tool);
+    }
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = SPACE_M;
         match session {
@@ -47,6 +54,23 @@ pub fn ui(
             }
         });
     });
+}
+
+/// How the tool is used, from its own rows; as many as there is room for.
+fn hint_line(ui: &mut Ui, tool: Tool) {
+    let font = egui::TextStyle::Small.resolve(ui.style());
+    let mut line = LayoutJob::default();
+    let mut add = |text: &str, color| line.append(text, 0.0, TextFormat::simple(font.clone(), color));
+    let (weak, strong) = (ui.visuals().weak_text_color(), ui.visuals().text_color());
+    for (index, hint) in tool.hints().iter().enumerate() {
+        let Some(how) = hint.how_text(ui.ctx()) else { continue };
+        add(if index == 0 { tool.label() } else { "" }, theme::accent(ui));
+        add(if index == 0 { "     " } else { "      " }, weak);
+        add(&how, strong);
+        add(&format!("  {}", hint.what), weak);
+    }
+    ui.add(egui::Label::new(line).truncate())
+        .on_hover_text(Command::Shortcuts.tooltip_with_keys(ui.ctx()));
 }
 
 /// What to do about components that could face either way.

@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::command::Keymap;
+use crate::panels::side::SideTab;
+use crate::viewport::NavigationSettings;
 pub use store::SettingsStore;
 
 /// Of the file. 1 had the window's size and the folders in fields of their own.
@@ -144,8 +146,12 @@ pub struct Settings {
     pub ui_scale: f32,
     /// Things jump instead of gliding.
     pub reduce_motion: bool,
+    /// How the user moves in the view.
+    pub navigation: NavigationSettings,
     /// Where the window is.
     pub window: WindowPlace,
+    /// What the side panel shows.
+    pub side_tab: SideTab,
     /// The folder used last, for each purpose.
     pub folders: BTreeMap<Purpose, PathBuf>,
     /// Scans opened last, newest first, at most ten.
@@ -169,7 +175,9 @@ impl Default for Settings {
             splat_scale: 1.0,
             ui_scale: 1.0,
             reduce_motion: false,
+            navigation: NavigationSettings::default(),
             window: WindowPlace::default(),
+            side_tab: SideTab::default(),
             folders: BTreeMap::new(),
             recent: Vec::new(),
             recent_commands: Vec::new(),

@@ -139,7 +139,7 @@ impl Aim {
             Edit::TurnPatch { point, n_points } => document.preview_turn_patch(point, n_points),
             Edit::TurnWhole(point) => document.preview_turn_whole(point),
             Edit::Mend(point) => document.preview_mend(point),
-            Edit::AddSources(_) | Edit::RemoveSources(_) | Edit::FlipSources(_) => return None,
+            ref edit => document.preview(edit),
         };
         // Before the scan is oriented there is nothing to show.
         change.ok()

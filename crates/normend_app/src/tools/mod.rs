@@ -1,6 +1,9 @@
 //! What the pointer does in the 3D view: each tool turns pointer events into points.
 
+mod hints;
 pub mod mend;
+
+pub use hints::{Hint, How};
 
 /// What the pointer is for in the 3D view.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -11,10 +14,13 @@ pub enum Tool {
 }
 
 impl Tool {
-    /// How it is used, in one line.
-    pub fn hint(self) -> &'static str {
+    /// All tools, in the order of the toolbar.
+    pub const ALL: [Self; 1] = [Self::Mend];
+
+    /// The name in the toolbar and in the sheet of shortcuts.
+    pub fn label(self) -> &'static str {
         match self {
-            Self::Mend => "Mend: point at a wrong region, click to turn what is highlighted",
+            Self::Mend => "Mend",
         }
     }
 }

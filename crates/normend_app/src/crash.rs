@@ -1,0 +1,260 @@
+//! When the editor has to stop: a report for those who mend the program, and the way back for the user.
+//!
+//! What a report says is kept here as it happens, since a panic has no time to ask. The only state that is not the
+//! editor's own, because a panic hook belongs to the process.
+
+use std::backtrace::Backtrace;
+use std::collections::VecDeque;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use crate::folders;
+
+/// Messages that a report repeats.
+const N_MESSAGES: usize = 20;
+/// Reports that are kept; older ones are removed.
+const N_REPORTS: usize = 10;
+/// Set for an editor that came up again by itself.
+const RESTARTED_VARIABLE: &str = "NORMEND_RESTARTED";
+/// An editor that came up again and is lost within this time would be lost again.
+const SHORTEST_RUN: Duration = Duration::from_secs(15);
+
+/// What is known of the run.
+#[derive(Debug)]
+struct Run {
+    adapter: String,
+    messages: VecDeque<String>,
+    /// The scan that is open.
+    scan: Option<PathBuf>,
+    /// When the window came up; before that a panic is a missing library, which is said in words.
+    started: Option<Instant>,
+    /// The graphics device is gone, and why.
+    lost: Option<String>,
+}
+
+static RUN: Mutex<Run> = Mutex::new(Run {
+    adapter: String::new(),
+    messages: VecDeque::new(),
+    scan: None,
+    started: None,
+    lost: None,
+});
+
+fn run() -> MutexGuard<'static, Run> {
+    RUN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Keeps a message for a report.
+pub(crate) fn remember(message: &str) {
+    let mut run = run();
+    if run.messages.len() == N_MESSAGES {
+        run.messages.pop_front();
+    }
+    run.messages.push_back(message.to_owned());
+}
+
+/// The window has come up, on this adapter.
+pub(crate) fn start(adapter: &str) {
+    let mut run = run();
+    adapter.clone_into(&mut run.adapter);
+    run.started = Some(Instant::now());
+}
+
+/// Keeps which scan is open, for [`restart`].
+pub(crate) fn set_scan(scan: Option<&Path>) {
+    run().scan = scan.map(Path::to_path_buf);
+}
+
+/// The graphics device is gone; `reason` is what the driver says.
+pub(crate) fn set_lost(reason: &str) {
+    run().lost = Some(reason.to_owned());
+}
+
+/// Why the graphics device is gone, if it is.
+pub(crate) fn lost() -> Option<String> {
+    run().lost.clone()
+}
+
+/// Whether a panic is that of egui or wgpu on a lost device, which they do not survive.
+pub(crate) fn is_loss(panic: &str) -> bool {
+    // The words of egui-wgpu 0.37, `renderer.rs`, and of wgpu 29, `Device is lost`.
+    let words = ["Failed to create staging buffer", "evice is lost", "evice lost"];
+    lost().is_some() || words.iter().any(|words| panic.contains(words))
+}
+
+/// What the editor's thread unwinds with when the graphics device is lost: nothing can be drawn any more.
+#[derive(Debug)]
+pub(crate) struct DeviceLost {
+    pub(crate) restarted: Result<(), String>,
+}
+
+/// Leaves a window whose graphics device is lost, after the program was started again. Unwinds to `run`.
+pub(crate) fn leave_lost() -> ! {
+    std::panic::resume_unwind(Box::new(DeviceLost { restarted: restart() }))
+}
+
+/// Whether this editor came up again by itself after the graphics device was lost, so that its edits are restored
+/// without asking.
+pub fn was_restarted() -> bool {
+    std::env::var_os(RESTARTED_VARIABLE).is_some()
+}
+
+/// Starts the program once more with the scan that is open. This process should end.
+///
+/// # Errors
+/// In words: the program cannot be started, or it was lost at once after it had come up again.
+pub(crate) fn restart() -> Result<(), String> {
+    let (scan, started) = {
+        let run = run();
+        (run.scan.clone(), run.started)
+    };
+    let is_too_soon = started.is_none_or(|started| started.elapsed() < SHORTEST_RUN);
+    if was_restarted() && is_too_soon {
+        return Err("it was lost again at once, so the graphics driver needs a look".to_owned());
+    }
+    restart_into(scan.as_deref()).map_err(|error| format!("it cannot be started again: {error}"))
+}
+
+/// Starts the same program on `scan`, as one that restores without asking.
+fn restart_into(scan: Option<&Path>) -> io::Result<()> {
+    let mut command = Command::new(std::env::current_exe()?);
+    if let Some(scan) = scan {
+        command.arg("--").arg(scan);
+    }
+    command.env(RESTARTED_VARIABLE, "1").spawn()?;
+    Ok(())
+}
+
+/// Writes a report of a panic while the window is up. `None` when there is nothing to write it for, or nowhere.
+pub(crate) fn report(panic: &str) -> Option<PathBuf> {
+    // A panic while this very state is held must not wait for itself.
+    let run = RUN.try_lock().ok()?;
+    run.started?;
+    let folder = folders::state_folder()?;
+    write_report(&folder, &run, panic, &jiff::Zoned::now()).ok()
+}
+
+fn write_report(folder: &Path, run: &Run, panic: &str, now: &jiff::Zoned) -> io::Result<PathBuf> {
+    fs::create_dir_all(folder)?;
+    let file = folder.join(format!("crash-{}.txt", now.strftime("%Y-%m-%d-%H%M%S")));
+    let secs = run.started.map_or(0, |started| started.elapsed().as_secs());
+    let mut text = format!(
+        "Normend {} closed unexpectedly.\n\nTime: {}\nSystem: {} ({})\nGraphics: {}\nRan for: {secs} s\n",
+        env!("CARGO_PKG_VERSION"),
+        now.strftime("%Y-%m-%d %H:%M:%S %:z"),
+        std::env::consts::OS,
+        std::env::consts::ARCH,
+        run.adapter,
+    );
+    if let Some(reason) = &run.lost {
+        text += &format!("Graphics device lost: {reason}\n");
+    }
+    text += &format!("\n{panic}\n\nLast messages:\n");
+    for message in &run.messages {
+        text += &format!("- {message}\n");
+    }
+    text += &format!("\nBacktrace:\n{}\n", Backtrace::force_capture());
+    fs::write(&file, without_home(text))?;
+    for old in reports(folder).into_iter().rev().skip(N_REPORTS) {
+        // It is only one too many; the next report tries again.
+        let _ = fs::remove_file(folder.join(old));
+    }
+    Ok(file)
+}
+
+/// Paths inside the home folder do not tell whose it is.
+fn without_home(text: String) -> String {
+    match directories::BaseDirs::new() {
+        Some(folders) if folders.home_dir().components().count() > 1 => {
+            text.replace(&*folders.home_dir().to_string_lossy(), "~")
+        }
+        _ => text,
+    }
+}
+
+/// The names of the reports in `folder`, oldest first.
+fn reports(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| name.starts_with("crash-") && name.ends_with(".txt"))
+        .collect();
+    // Their names are dates.
+    names.sort();
+    names
+}
+
+/// The newest report, unless it is `told` or older: its name and its path.
+pub(crate) fn news(told: &str) -> Option<(String, PathBuf)> {
+    let folder = folders::state_folder()?;
+    news_in(&folder, told)
+}
+
+fn news_in(folder: &Path, told: &str) -> Option<(String, PathBuf)> {
+    let newest = reports(folder).pop().filter(|name| name.as_str() > told)?;
+    let path = folder.join(&newest);
+    Some((newest, path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn a_run() -> Run {
+        Run {
+            adapter: "Test adapter (Vulkan)".to_owned(),
+            messages: VecDeque::from(["Opened church.ply.".to_owned()]),
+            scan: None,
+            started: Some(Instant::now()),
+            lost: Some("destroyed".to_owned()),
+        }
+    }
+
+    #[test]
+    fn a_report_says_what_is_needed_and_is_told_once() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(news_in(folder.path(), ""), None);
+        let now: jiff::Zoned = "2026-11-22T14:03:59+01:00[Europe/Berlin]".parse().unwrap();
+        let file = write_report(folder.path(), &a_run(), "panicked at src/x.rs:1:1:\nno luck", &now).unwrap();
+        let text = fs::read_to_string(&file).unwrap();
+        for part in [
+            env!("CARGO_PKG_VERSION"),
+            std::env::consts::OS,
+            "Test adapter (Vulkan)",
+            "no luck",
+            "- Opened church.ply.",
+            "lost: destroyed",
+            "2026-11-22 14:03:59",
+            "Backtrace:",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        let (name, path) = news_in(folder.path(), "").unwrap();
+        assert_eq!((name.as_str(), &path), ("crash-2026-11-22-140359.txt", &file));
+        assert_eq!(news_in(folder.path(), &name), None);
+    }
+
+    #[test]
+    fn only_the_last_reports_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let first: jiff::Zoned = "2026-01-01T00:00:00+00:00[UTC]".parse().unwrap();
+        for minute in 0..(N_REPORTS as i64 + 3) {
+            let now = &first + jiff::SignedDuration::from_mins(minute);
+            write_report(folder.path(), &a_run(), "", &now).unwrap();
+        }
+        let names = reports(folder.path());
+        assert_eq!(names.len(), N_REPORTS);
+        assert_eq!(names[0], "crash-2026-01-01-000300.txt");
+    }
+
+    #[test]
+    fn the_home_folder_is_not_named() {
+        let home = directories::BaseDirs::new().unwrap().home_dir().display().to_string();
+        assert_eq!(without_home(format!("at {home}/scans/a.ply")), "at ~/scans/a.ply");
+    }
+}

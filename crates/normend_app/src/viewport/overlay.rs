@@ -1,0 +1,96 @@
+//! What is painted over the picture: the pivot, words beside the pointer, and notices of states that hide or change something.
+
+use egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, StrokeKind, TextureId, Ui, Vec2};
+
+use super::Viewport;
+use crate::theme::{SPACE_S, SPACE_XS};
+
+/// Behind a light line, so that it is seen on any picture.
+pub(super) const HALO: Color32 = Color32::from_black_alpha(140);
+/// A line over the picture.
+pub(super) const LINE: Color32 = Color32::from_rgba_premultiplied(230, 230, 230, 230);
+
+impl Viewport {
+    pub(super) fn picture(&self, ui: &Ui, texture: TextureId) {
+        let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+        ui.painter().image(texture, self.rect, whole, Color32::WHITE);
+    }
+
+    pub(super) fn pivot_mark(&self, ui: &Ui) {
+        let Some(place) = self.place(self.camera.pivot) else {
+            return;
+        };
+        let painter = ui.painter_at(self.rect);
+        for (width, color) in [(3.0, HALO), (1.5, LINE)] {
+            painter.circle_stroke(place, 6.0, Stroke::new(width, color));
+            painter.circle_filled(place, width * 0.75, color);
+        }
+    }
+
+    /// Says at the top of the view that something is cut away or that keys fly, and how to leave that.
+    pub(super) fn notices(&self, ui: &Ui) {
+        let mut top = self.rect.top() + SPACE_S;
+        if let Some(fly) = &self.fly {
+            let text = format!(
+                "Flying at speed {:.2} · W A S D move, E and Q rise and sink, Shift hurries, drag looks, wheel sets the speed, Esc ends",
+                fly.speed()
+            );
+            top = self.notice(ui, top, &text);
+        }
+        if self.clip.near > 0.0 {
+            let text = format!(
+                "The nearest {:.0} % is cut away · Ctrl+wheel moves the cut",
+                100.0 * self.clip.near
+            );
+            self.notice(ui, top, &text);
+        }
+    }
+
+    /// One line in the middle, `top` at its upper edge; returns where the next one goes.
+    fn notice(&self, ui: &Ui, top: f32, text: &str) -> f32 {
+        let painter = ui.painter_at(self.rect);
+        let color = ui.visuals().strong_text_color();
+        let padding = Vec2::new(SPACE_S, SPACE_XS);
+        let max_width = (self.rect.width() - 4.0 * SPACE_S).max(80.0);
+        let galley = painter.layout(text.to_owned(), FontId::proportional(13.0), color, max_width);
+        let size = galley.size() + 2.0 * padding;
+        let rect = Align2::CENTER_TOP.anchor_size(Pos2::new(self.rect.center().x, top), size);
+        painter.rect(
+            rect,
+            5.0,
+            ui.visuals().window_fill,
+            ui.visuals().window_stroke,
+            StrokeKind::Inside,
+        );
+        painter.galley(rect.min + padding, galley, color);
+        // Painted text is not there for screen readers.
+        let response = ui.interact(rect, ui.scope_id().with(("notice", top as i32)), egui::Sense::hover());
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Label, true, text));
+        rect.bottom() + SPACE_XS
+    }
+
+    /// A few words beside the pointer.
+    pub fn badge(&self, ui: &Ui, pointer: Pos2, text: &str) {
+        let painter = ui.painter_at(self.rect);
+        let color = ui.visuals().strong_text_color();
+        let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(13.0), color);
+        let padding = Vec2::new(8.0, 4.0);
+        let size = galley.size() + 2.0 * padding;
+        let mut min = pointer + Vec2::new(18.0, 14.0);
+        if min.x + size.x > self.rect.right() {
+            min.x = pointer.x - 12.0 - size.x;
+        }
+        if min.y + size.y > self.rect.bottom() {
+            min.y = pointer.y - 8.0 - size.y;
+        }
+        let rect = Rect::from_min_size(min, size);
+        painter.rect(
+            rect,
+            5.0,
+            ui.visuals().window_fill,
+            ui.visuals().window_stroke,
+            StrokeKind::Inside,
+        );
+        painter.galley(min + padding, galley, color);
+    }
+}

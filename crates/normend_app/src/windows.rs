@@ -1,0 +1,140 @@
+//! The windows over the editor: which are open, what their answers do, and what Escape closes.
+
+use std::path::PathBuf;
+
+use egui::Ui;
+
+use crate::app::App;
+use crate::command::{Action, Command};
+use crate::crash;
+use crate::panels::modal::Modal;
+use crate::panels::preferences::Preferences;
+use crate::panels::{about, export, messages, open_path, palette, shortcuts, unsaved};
+use crate::session::Session;
+
+/// The windows over the editor; `None` or `false` is closed.
+#[derive(Default)]
+pub(crate) struct Windows {
+    /// While it is open, nothing else acts.
+    pub(crate) modal: Option<Modal>,
+    pub(crate) shortcuts: Option<String>,
+    pub(crate) log: bool,
+    pub(crate) log_view: messages::LogView,
+    pub(crate) about: bool,
+    pub(crate) preferences: bool,
+    pub(crate) preferences_view: Preferences,
+}
+
+impl Windows {
+    /// Closes all that leave the editor to itself; says whether any was open.
+    pub(crate) fn close(&mut self) -> bool {
+        let any = self.shortcuts.is_some() || self.about || self.log || self.preferences;
+        self.shortcuts = None;
+        (self.about, self.log, self.preferences) = (false, false, false);
+        self.preferences_view.rest();
+        any
+    }
+}
+
+impl App {
+    /// The window is up. Says what became of the last one: `report` is of a crash that the user was not told of yet.
+    pub(crate) fn say_what_happened(&mut self, report: Option<PathBuf>) {
+        crash::start(&self.adapter);
+        if let Some(report) = report {
+            self.messages.error(format!(
+                "Normend closed unexpectedly the last time. A report for its makers is at {}.",
+                report.display()
+            ));
+        }
+        if crash::was_restarted() {
+            self.messages
+                .note("The graphics device was lost, so Normend started again with your scan.");
+        }
+    }
+
+    pub(crate) fn show_windows(&mut self, ui: &Ui) {
+        if let Some(search) = &mut self.windows.shortcuts {
+            let mut open = true;
+            shortcuts::ui(ui, &mut open, search);
+            if !open {
+                self.windows.shortcuts = None;
+            }
+        }
+        if self.windows.log {
+            let running = self.work.as_ref().map(|work| (work.title(), work.status()));
+            let windows = &mut self.windows;
+            messages::log(ui, &mut windows.log, &mut windows.log_view, &mut self.messages, running);
+        }
+        if self.windows.about {
+            about::ui(ui, &mut self.windows.about, &self.adapter);
+        }
+        if self.windows.preferences {
+            let windows = &mut self.windows;
+            let settings = &mut self.settings.settings;
+            windows.preferences_view.ui(ui, &mut windows.preferences, settings);
+        }
+        self.show_modal(ui);
+    }
+
+    fn ask_palette(&self, ui: &Ui, window: &mut palette::PaletteWindow) -> palette::Decision {
+        let settings = &self.settings.settings;
+        let availability = |command: Command| self.availability(command);
+        let offers = palette::Offers {
+            availability: &availability,
+            recent_commands: &settings.recent_commands,
+            recent_scans: &settings.recent,
+            mode: self.session.as_ref().map(|_| self.mode),
+        };
+        window.ui(ui, &offers)
+    }
+
+    fn show_modal(&mut self, ui: &Ui) {
+        // What is decided may open the next window, so this one is closed first and put back while it waits.
+        match self.windows.modal.take() {
+            None => {}
+            Some(Modal::Palette(mut window)) => match self.ask_palette(ui, &mut window) {
+                palette::Decision::Wait => self.windows.modal = Some(Modal::Palette(window)),
+                palette::Decision::Close => {}
+                palette::Decision::Act(action) => {
+                    if let Action::Run(command) = &action {
+                        self.settings.settings.remember_command(command.name());
+                    }
+                    self.act(action);
+                }
+            },
+            Some(Modal::OpenPath(mut window)) => match window.ui(ui) {
+                open_path::Decision::Wait => self.windows.modal = Some(Modal::OpenPath(window)),
+                open_path::Decision::Close => {}
+                open_path::Decision::Open(path) => self.act(Action::OpenScan(path)),
+            },
+            Some(Modal::Export(mut window)) => match window.ui(ui) {
+                export::Decision::Wait => self.windows.modal = Some(Modal::Export(window)),
+                export::Decision::Close => self.after_export = None,
+                export::Decision::Browse => {
+                    self.windows.modal = Some(Modal::Export(window));
+                    self.act(Action::BrowseExport);
+                }
+                export::Decision::Export { path, overwrite_input } => {
+                    self.act(Action::ExportTo { path, overwrite_input });
+                }
+            },
+            Some(Modal::Unsaved(leaving)) => {
+                let session = self.session.as_ref();
+                let name = session.map_or("this scan", |session| &session.name);
+                let mends = session.is_none_or(Session::has_unsaved_mends);
+                match unsaved::ui(ui, name, mends) {
+                    unsaved::Decision::Wait => self.windows.modal = Some(Modal::Unsaved(leaving)),
+                    unsaved::Decision::Export => {
+                        self.act(Command::Export.into());
+                        match &self.windows.modal {
+                            Some(Modal::Export(_)) => self.after_export = Some(leaving),
+                            _ => self.windows.modal = Some(Modal::Unsaved(leaving)),
+                        }
+                    }
+                    unsaved::Decision::Discard => self.leave_now(leaving),
+                    unsaved::Decision::Cancel => {}
+                }
+            }
+        }
+    }
+}
