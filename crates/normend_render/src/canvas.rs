@@ -97,7 +97,7 @@ impl Canvas {
                 pass.set_pipeline(&stage.passes.splat);
                 chunks.draw(&mut pass, shot.stride(), 3);
             }
-            if stage.n_spheres > 0 {
+            if shot.settings.spheres && stage.n_spheres > 0 {
                 pass.set_pipeline(&stage.passes.sphere);
                 pass.draw(0..3 * stage.n_spheres, 0..1);
             }

@@ -175,6 +175,8 @@ pub struct DrawSettings {
     pub compare: Compare,
     /// Normals as lines.
     pub hair: Option<Hair>,
+    /// Whether the spheres are drawn.
+    pub spheres: bool,
 }
 
 impl Default for DrawSettings {
@@ -189,6 +191,7 @@ impl Default for DrawSettings {
             clip: Clip::default(),
             compare: Compare::default(),
             hair: None,
+            spheres: true,
         }
     }
 }

@@ -1,12 +1,15 @@
 //! Pictures of any size, in tiles, beside the window's picture.
 
+use std::ops::Range;
+
 use egui_wgpu::wgpu;
 use glam::UVec2;
 
-use crate::RenderError;
 use crate::canvas::{Canvas, Stage};
+use crate::marks::{GrowingBuffer, highlight_words};
 use crate::read_back::{COLOR_BYTES, ReadBack};
 use crate::uniforms::{Shot, Tile};
+use crate::{Camera, RenderError};
 
 /// Largest side of a picture in pixels.
 pub const MAX_PICTURE_SIDE: u32 = 8192;
@@ -18,7 +21,8 @@ const MAX_TILE_SIDE: u32 = 4096;
 const MARGIN: u32 = 64;
 
 /// All that a picture is made from, to be drawn in any thread while the renderer goes on. It shows the points, signs and
-/// marks as they are when it is drawn.
+/// marks as they are when it is drawn. A clone is cheap.
+#[derive(Clone)]
 pub struct PictureMaker {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
@@ -28,6 +32,24 @@ pub struct PictureMaker {
 }
 
 impl PictureMaker {
+    /// The same picture seen by another camera, for those of a turntable.
+    #[must_use]
+    pub fn with_camera(mut self, camera: &Camera) -> Self {
+        self.shot.view.camera = *camera;
+        self
+    }
+
+    /// The same picture with other `ranges` of instances highlighted (ascending, disjoint), whatever the window
+    /// highlights. Uploads 8 bytes a range.
+    #[must_use]
+    pub fn with_highlight(mut self, ranges: &[Range<u32>]) -> Self {
+        let mut highlights = GrowingBuffer::new(&self.device, "highlighted ranges of a picture");
+        highlights.set(&self.device, &self.queue, highlight_words(ranges));
+        self.stage.has.n_highlights = highlights.len();
+        self.stage.highlights = highlights.buffer().clone();
+        self
+    }
+
     /// What fits on `device` of a tile's side.
     pub(crate) fn tile_side(device: &wgpu::Device) -> u32 {
         device.limits().max_texture_dimension_2d.min(MAX_TILE_SIDE)

@@ -1,5 +1,6 @@
 //! Pictures, checked by counting pixels, and shaders, checked without a GPU.
 
+mod big_pictures;
 mod marks;
 mod pictures;
 mod scene;

@@ -45,6 +45,7 @@ impl Shot {
             && a.splat_scale == b.splat_scale
             && a.stride == b.stride
             && a.clip == b.clip
+            && a.spheres == b.spheres
             // The depths that hide hair are kept only when there is hair.
             && a.hair.is_some() == b.hair.is_some()
     }

@@ -6,7 +6,7 @@ use egui_wgpu::wgpu;
 use glam::Vec3;
 
 use crate::gpu_types::{ID_NONE, ID_SPHERE};
-use crate::{Camera, DrawSettings, HeadlessDevice, Hit, Sphere, SplatRenderer, StandardView};
+use crate::{Camera, DrawSettings, HeadlessDevice, Hit, PictureMaker, Sphere, SplatRenderer, StandardView};
 
 pub const SIZE: [u32; 2] = [320, 240];
 pub const ASPECT: f32 = SIZE[0] as f32 / SIZE[1] as f32;
@@ -114,6 +114,13 @@ impl Scene {
             camera,
             settings: DrawSettings::default(),
         })
+    }
+
+    /// A maker of a picture as [`Self::draw`] draws it, of `size`.
+    pub fn maker(&self, size: [u32; 2], transparent: bool) -> PictureMaker {
+        let HeadlessDevice { device, queue, .. } = &self.gpu;
+        self.renderer
+            .picture_maker(device, queue, &self.camera, size, 1.0, &self.settings, transparent)
     }
 
     pub fn draw(&mut self) -> bool {
