@@ -11,6 +11,9 @@ use egui::{Key, Modifiers, Pos2, Vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
+use normend_app::panels::hints::Card;
+use normend_app::panels::hints::Card;
+use normend_app::settings::Settings;
 use normend_app::{App, SettingsStore, graphics_setup};
 use normend_core::{Silent, shapes};
 use normend_io::Positions;
@@ -29,6 +32,16 @@ pub fn start(scan: impl FnOnce(&Path) -> Option<PathBuf>) -> Option<Editor> {
 
 /// As [`start`], on a screen with this many pixels a point.
 pub fn start_scaled(pixels_per_point: f32, scan: impl FnOnce(&Path) -> Option<PathBuf>) -> Option<Editor> {
+    start_prepared(pixels_per_point, |_| {}, scan)
+}
+
+/// As [`start_scaled`], with settings that `prepare` has changed. Without it the camera does not fly, so that it is where it
+/// is asked to be in the next frame, and no hint for the first steps stands over the view.
+pub fn start_prepared(
+    pixels_per_point: f32,
+    prepare: impl FnOnce(&mut Settings),
+    scan: impl FnOnce(&Path) -> Option<PathBuf>,
+) -> Option<Editor> {
     if let Err(error) = HeadlessDevice::new() {
         let required = std::env::var_os("NORMEND_REQUIRE_GPU").is_some_and(|value| value == "1");
         assert!(!required, "NORMEND_REQUIRE_GPU=1, but {error}");
@@ -37,7 +50,13 @@ pub fn start_scaled(pixels_per_point: f32, scan: impl FnOnce(&Path) -> Option<Pa
     }
     let folder = tempfile::tempdir().unwrap();
     let scan = scan(folder.path());
-    let (settings, problem) = SettingsStore::load_from(&folder.path().join("settings"));
+    let (mut settings, problem) = SettingsStore::load_from(&folder.path().join("settings"));
+    settings.settings.reduce_motion = true;
+    let hints = Card::ALL.map(|card| card.name().to_owned());
+    settings.settings.dismissed_hints.extend(hints);
+    // The first hints lie over the view.
+    settings.settings.dismissed_hints = Card::ALL.map(|card| card.name().to_owned()).into();
+    prepare(&mut settings.settings);
     let harness = Harness::builder()
         .with_size(Vec2::new(1000.0, 700.0))
         .with_step_dt(1.0 / 60.0)

@@ -595,6 +595,9 @@ impl App {
         session.install(propagation);
         if let Some(scene) = &mut self.scene {
             self.mend.reset(scene);
+            if crash::is_loss_asked_for() {
+                scene.lose_device();
+            }
             if let Err(error) = scene.show_document(session, cloud) {
                 self.messages
                     .error(format!("The scan is oriented but cannot be shown: {error}."));

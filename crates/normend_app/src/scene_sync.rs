@@ -95,6 +95,11 @@ impl Scene {
         }
     }
 
+    /// Gives the graphics device up, as a driver that fails does; for trying out what happens then.
+    pub(crate) fn lose_device(&self) {
+        self.state.device.destroy();
+    }
+
     /// Shows nothing.
     pub fn clear(&mut self) {
         self.renderer.clear_cloud();

@@ -398,6 +398,17 @@ impl Camera {
         Some(0.5 * size + Vec2::new(in_view.x, -in_view.y) / len)
     }
 
+    /// What is seen at `pixel` (from the top left), near and far: the place in the eye's plane where the line of sight begins, and
+    /// its direction of unit length, away from the eye.
+    pub fn ray(&self, pixel: Vec2, size: Vec2) -> (Vec3, Vec3) {
+        let across = (pixel - 0.5 * size) * self.pixel_len_at_pivot(size) / self.distance;
+        let forward = match self.projection {
+            Projection::Perspective => self.right() * across.x - self.up() * across.y - self.back(),
+            Projection::Orthographic => -self.back(),
+        };
+        (self.unproject(pixel, 0.0, size), forward.normalize_or(-self.back()))
+    }
+
     /// World point seen at `pixel` (from the top left) at `depth` along the view axis; the inverse of [`Self::project`].
     pub fn unproject(&self, pixel: Vec2, depth: f32, size: Vec2) -> Vec3 {
         let across = (pixel - 0.5 * size) * self.pixel_len(depth, size);

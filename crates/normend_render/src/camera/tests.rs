@@ -236,6 +236,15 @@ proptest! {
     }
 
     #[test]
+    fn a_ray_goes_through_what_is_seen_there(camera in cameras(), pixel in pixels(), depth in 0.3_f32..30.0) {
+        let point = camera.unproject(pixel, depth, SIZE);
+        let (from, direction) = camera.ray(pixel, SIZE);
+        let along = (point - from).dot(direction);
+        prop_assert!(along > 0.0 && (direction.length() - 1.0).abs() < 1e-5);
+        prop_assert!((from + along * direction).distance(point) < 1e-4 * (depth + point.length()));
+    }
+
+    #[test]
     fn a_ball_rolled_there_and_back_is_as_before(camera in cameras(), from in pixels(), to in pixels()) {
         let mut rolled = camera;
         rolled.roll_ball(from, to, SIZE);
