@@ -12,7 +12,6 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
 use normend_app::panels::hints::Card;
-use normend_app::panels::hints::Card;
 use normend_app::settings::Settings;
 use normend_app::{App, SettingsStore, graphics_setup};
 use normend_core::{Silent, shapes};
@@ -52,10 +51,6 @@ pub fn start_prepared(
     let scan = scan(folder.path());
     let (mut settings, problem) = SettingsStore::load_from(&folder.path().join("settings"));
     settings.settings.reduce_motion = true;
-    let hints = Card::ALL.map(|card| card.name().to_owned());
-    settings.settings.dismissed_hints.extend(hints);
-    // The first hints lie over the view.
-    settings.settings.dismissed_hints = Card::ALL.map(|card| card.name().to_owned()).into();
     prepare(&mut settings.settings);
     let harness = Harness::builder()
         .with_size(Vec2::new(1000.0, 700.0))
