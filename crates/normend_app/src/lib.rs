@@ -7,6 +7,7 @@
 
 mod actions;
 pub mod app;
+mod availability;
 pub mod command;
 pub mod crash;
 mod dialogs;

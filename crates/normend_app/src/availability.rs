@@ -1,0 +1,100 @@
+//! Which commands can be run now, and why the others cannot.
+
+use normend_core::Document;
+
+use crate::app::App;
+use crate::command::Command;
+use crate::work::Work;
+
+impl App {
+    /// Says whether `command` can be run now, and if not, why.
+    pub fn availability(&self, command: Command) -> Result<(), &'static str> {
+        let exporting = matches!(self.work, Some(Work::Export { .. }));
+        let document = self.document();
+        let is_oriented = document.is_some_and(|document| document.orientation().is_some());
+        let n_selected = self.session.as_ref().map_or(0, |session| session.selected.len());
+        let check = |holds: bool, reason| if holds { Ok(()) } else { Err(reason) };
+        match command {
+            Command::Open | Command::OpenPath | Command::OpenSample => check(!exporting, "an export is being written"),
+            Command::Export => {
+                check(document.is_some(), "no scan is open")?;
+                check(self.work.is_none(), "wait for the running work, or cancel it")?;
+                check(is_oriented, "the scan is not oriented yet")
+            }
+            Command::Propagate => {
+                check(document.is_some(), "no scan is open")?;
+                check(!exporting, "an export is being written")?;
+                check(
+                    !matches!(self.work, Some(Work::Open { .. })),
+                    "another scan is being opened",
+                )
+            }
+            Command::Undo => check(
+                document.and_then(Document::next_undo).is_some(),
+                "there is nothing to undo",
+            ),
+            Command::Redo => check(
+                document.and_then(Document::next_redo).is_some(),
+                "there is nothing to redo",
+            ),
+            Command::MendHere | Command::MendAlongTreeHere | Command::TurnWholeHere => {
+                check(is_oriented, "the scan is not oriented yet")
+            }
+            Command::LargerPatch | Command::SmallerPatch => {
+                check(is_oriented, "the scan is not oriented yet")?;
+                let propagation = document.and_then(Document::propagation);
+                check(
+                    propagation.is_some_and(|propagation| propagation.patches.is_some()),
+                    "there are no patches: choose Estimate and the preset Automatic, then Propagate",
+                )
+            }
+            Command::SelectAllSources => check(
+                document.is_some_and(|document| !document.sources().is_empty()),
+                "there are no sources",
+            ),
+            Command::FlipSources | Command::RemoveSources => check(n_selected > 0, "no source is selected"),
+            Command::Frame
+            | Command::FrameAll
+            | Command::SetPivot
+            | Command::ViewFront
+            | Command::ViewBack
+            | Command::ViewRight
+            | Command::ViewLeft
+            | Command::ViewTop
+            | Command::ViewBottom
+            | Command::ViewCorner
+            | Command::ToggleOrthographic
+            | Command::ZoomIn
+            | Command::ZoomOut
+            | Command::OrbitLeft
+            | Command::OrbitRight
+            | Command::OrbitUp
+            | Command::OrbitDown
+            | Command::PanLeft
+            | Command::PanRight
+            | Command::PanUp
+            | Command::PanDown
+            | Command::Fly
+            | Command::ClipBox
+            | Command::CutDeeper
+            | Command::CutLess
+            | Command::LargerSplats
+            | Command::SmallerSplats
+            | Command::NextDisplayMode => check(document.is_some(), "no scan is open"),
+            Command::ShowHints => check(
+                !self.settings.settings.dismissed_hints.is_empty(),
+                "no hint was dismissed yet",
+            ),
+            Command::Quit
+            | Command::Cancel
+            | Command::LargerInterface
+            | Command::SmallerInterface
+            | Command::UsualInterface
+            | Command::Preferences
+            | Command::Palette
+            | Command::Shortcuts
+            | Command::Log
+            | Command::About => Ok(()),
+        }
+    }
+}
