@@ -22,6 +22,8 @@ mod new_file;
 
 mod save;
 
+mod scalars;
+
 mod stations;
 
 #[cfg(test)]

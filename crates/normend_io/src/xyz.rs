@@ -7,8 +7,9 @@
 use normend_core::{PointCloud, Progress};
 
 use crate::error::{Broken, Place, Stop, quoted};
+use crate::scalars::{Column, slots_for};
 use crate::table::{
-    Layout, N_VALUES, NORMAL, Rows, SIDE, Span, Spans, Starts, Table, VALUE_NAMES, find_parts, is_space,
+    COORDINATES, Layout, N_VALUES, NORMAL, Rows, SIDE, Span, Spans, Starts, Table, VALUE_NAMES, find_parts, is_space,
 };
 use crate::value::{ValueType, parse};
 
@@ -26,6 +27,8 @@ pub(crate) struct XyzLayout {
     has_counts: bool,
     /// The column of each value, by slot.
     columns: [Option<usize>; N_VALUES],
+    /// Values that a line has at least to be a row.
+    n_required: usize,
     table: Table,
 }
 
@@ -40,6 +43,7 @@ pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<XyzLayout, S
         names: None,
         has_counts: false,
         columns: UNNAMED,
+        n_required: 0,
         table: Table {
             n_rows: 0,
             types: [ValueType::Text; N_VALUES],
@@ -51,6 +55,7 @@ pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<XyzLayout, S
     };
     let start = layout.find_columns(bytes)?;
     layout.table.has_normals = layout.columns[NORMAL].iter().all(Option::is_some);
+    layout.n_required = layout.columns.iter().flatten().max().map_or(0, |&last| last + 1);
     let mut order: Vec<usize> = (0..N_VALUES).filter(|&slot| layout.columns[slot].is_some()).collect();
     order.sort_unstable_by_key(|&slot| layout.columns[slot]);
     layout.table.order = order;
@@ -220,6 +225,78 @@ impl XyzLayout {
             }
         }
         n_units > 0
+    }
+
+    /// The first rows.
+    fn sample<'a>(&self, bytes: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
+        let lines = Lines {
+            bytes,
+            line_end: self.line_end,
+            at: self.table.start(),
+        };
+        let n_required = self.n_required;
+        let is_row = move |line: &&[u8]| !is_skipped(line) && Values::new(line).count() >= n_required;
+        lines.map(|line| line.of(bytes)).filter(is_row).take(SAMPLE_ROWS)
+    }
+
+    /// The columns of numbers, as far as the first row tells.
+    pub(crate) fn columns(&self, bytes: &[u8]) -> Vec<Column> {
+        let row = self.sample(bytes).next().unwrap_or_default();
+        let names = self.names.map_or(&b""[..], |names| names.of(bytes));
+        let mut names = Values::new(names).map(|name| {
+            let name = String::from_utf8_lossy(name.of(names)).into_owned();
+            name.trim_matches(['"', '\'']).to_owned()
+        });
+        let mut columns: Vec<Column> = Vec::new();
+        for (index, value) in Values::new(row).enumerate() {
+            let name = names.next().filter(|name| !name.is_empty());
+            let value = value.of(row);
+            if value.is_empty() || parse(value).is_some() {
+                let mut name = name.unwrap_or_else(|| format!("Column {}", index + 1));
+                // Two columns of one name are told apart by where they stand.
+                if columns.iter().any(|column| column.name == name) {
+                    name = format!("{name} (column {})", index + 1);
+                }
+                columns.push(Column { name, index });
+            }
+        }
+        columns
+    }
+
+    /// The last three of six or seven columns without names, as programs write points with colors, or with intensity and colors:
+    /// whole numbers up to 255 in all of the first rows, and not only 0 and 1.
+    pub(crate) fn sample_of_colors(&self, bytes: &[u8]) -> Option<[usize; 3]> {
+        if self.names.is_some() || self.table.has_normals {
+            return None;
+        }
+        let mut largest = 0.0_f64;
+        let mut n_columns = None;
+        for row in self.sample(bytes) {
+            let values: Vec<f64> = Values::new(row).map_while(|value| parse(value.of(row))).collect();
+            let expected = *n_columns.get_or_insert(values.len());
+            let is_channel = |value: &f64| (0.0..=255.0).contains(value) && value.fract() == 0.0;
+            if !matches!(values.len(), 6 | 7)
+                || values.len() != expected
+                || !values[expected - 3..].iter().all(is_channel)
+            {
+                return None;
+            }
+            largest = values[expected - 3..]
+                .iter()
+                .fold(largest, |largest, &value| largest.max(value));
+        }
+        let last = n_columns.filter(|_| largest > 1.0)?;
+        Some([last - 3, last - 2, last - 1])
+    }
+
+    /// The same rows with other values: the coordinates, and these columns. Returns the slots of the latter.
+    pub(crate) fn with_columns(&self, columns: &[usize]) -> (Self, Vec<usize>) {
+        let (columns, slots) = slots_for(&self.columns[COORDINATES], columns);
+        let layout = Self {
+            columns,
+            ..self.clone()
+        };
+        (layout, slots)
     }
 
     /// Whether confidence can be written: without names nobody would know what the columns are, nor which are a normal's.
@@ -459,7 +536,7 @@ impl Rows for XyzRows<'_> {
                     };
                 }
             }
-            if n_columns == self.slots.len() {
+            if n_columns >= self.layout.n_required {
                 if let Some((n_missing, ..)) = &mut self.announced {
                     *n_missing = n_missing.saturating_sub(1);
                 }
@@ -476,7 +553,7 @@ impl Rows for XyzRows<'_> {
                         self.layout.place(self.bytes, line.start),
                         format!(
                             "{n_columns} values where at least {} belong: correct or remove the line {}",
-                            self.slots.len(),
+                            self.layout.n_required,
                             quoted(content)
                         ),
                     ));

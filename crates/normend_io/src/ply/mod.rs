@@ -15,6 +15,7 @@ pub(crate) use self::header::sniff;
 use self::header::{Element, Header, Kind};
 use self::rows::{FixedRows, WalkedRows, skip_element};
 use crate::error::{Broken, Place, Stop, quoted};
+use crate::scalars::{Column, slots_for};
 use crate::table::{
     COORDINATES, Layout, N_VALUES, NORMAL, Rows, SIDE, Span, Starts, Table, VALUE_NAMES, find_parts, is_space,
 };
@@ -205,6 +206,46 @@ impl Layout for PlyLayout {
 }
 
 impl PlyLayout {
+    /// The numbers of a row: properties that are no lists.
+    pub(crate) fn columns(&self) -> Vec<Column> {
+        let properties = &self.header.elements[self.vertex].properties;
+        let scalars = properties
+            .iter()
+            .enumerate()
+            .filter(|(_, property)| matches!(property.kind, Kind::Scalar(_)));
+        scalars
+            .map(|(index, property)| Column {
+                name: property.name.clone(),
+                index,
+            })
+            .collect()
+    }
+
+    /// Whether the property of a row is declared as bytes.
+    pub(crate) fn is_byte(&self, property: usize) -> bool {
+        let properties = &self.header.elements[self.vertex].properties;
+        matches!(properties[property].kind, Kind::Scalar(Scalar::UChar))
+    }
+
+    /// The same rows with other values: the coordinates, and the properties `columns`, which are no lists. Returns the slots of
+    /// these.
+    pub(crate) fn with_columns(&self, columns: &[usize]) -> (Self, Vec<usize>) {
+        let (properties, slots) = slots_for(&self.slots.properties[COORDINATES], columns);
+        let mut layout = Self {
+            slots: Slots { properties },
+            ..self.clone()
+        };
+        let element = &self.header.elements[self.vertex];
+        for (slot, property) in properties.iter().enumerate() {
+            if let Some(property) = property
+                && let Kind::Scalar(scalar) = element.properties[*property].kind
+            {
+                layout.table.types[slot] = self.header.value_type(scalar);
+            }
+        }
+        (layout, slots)
+    }
+
     /// In text, a row that is short or long shifts all that follow, and the end of the file is where that shows. So a
     /// line that holds another number of values than a row, below lines that hold the right one, is named instead.
     fn clearer(&self, bytes: &[u8], start: usize, stop: Stop) -> Stop {
