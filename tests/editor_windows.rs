@@ -157,8 +157,11 @@ fn the_sheet_fits_into_the_smallest_window() {
         editor.key(Modifiers::NONE, Key::F1);
         editor.harness.run_steps(4);
         // What is done stands left, the keys right: both are inside, and no column is squeezed over another.
-        for (what, how) in normend_app::command::MOUSE {
-            let [what, how] = [what, how].map(|label| {
+        let tools = normend_app::tools::Tool::Mend.hints().iter();
+        let hints = tools.filter_map(|hint| Some((hint.what, hint.how_text(&editor.harness.ctx)?)));
+        let mouse = normend_app::command::MOUSE.map(|(what, how)| (what, how.to_owned()));
+        for (what, how) in mouse.into_iter().chain(hints.collect::<Vec<_>>()) {
+            let [what, how] = [what, how.as_str()].map(|label| {
                 let found = editor.harness.query_all_by_label(label);
                 found
                     .map(|node| node.rect())

@@ -20,6 +20,8 @@ const N_MESSAGES: usize = 20;
 const N_REPORTS: usize = 10;
 /// Set for an editor that came up again by itself.
 const RESTARTED_VARIABLE: &str = "NORMEND_RESTARTED";
+/// Asks for a loss of the graphics device, see [`is_loss_asked_for`].
+const LOSE_VARIABLE: &str = "NORMEND_LOSE_DEVICE";
 /// An editor that came up again and is lost within this time would be lost again.
 const SHORTEST_RUN: Duration = Duration::from_secs(15);
 
@@ -95,6 +97,11 @@ pub(crate) struct DeviceLost {
 /// Leaves a window whose graphics device is lost, after the program was started again. Unwinds to `run`.
 pub(crate) fn leave_lost() -> ! {
     std::panic::resume_unwind(Box::new(DeviceLost { restarted: restart() }))
+}
+
+/// Whether this editor shall lose its graphics device once it shows a scan: so the way back can be tried out.
+pub(crate) fn is_loss_asked_for() -> bool {
+    std::env::var_os(LOSE_VARIABLE).is_some() && !was_restarted()
 }
 
 /// Whether this editor came up again by itself after the graphics device was lost, so that its edits are restored

@@ -52,6 +52,8 @@ struct Colors {
     faint: Color32,
     warning: Color32,
     error: Color32,
+    /// The button for the one thing to do next, under white text.
+    primary: Color32,
 }
 
 const DARK: Colors = Colors {
@@ -69,6 +71,7 @@ const DARK: Colors = Colors {
     faint: Color32::from_rgb(0x24, 0x28, 0x2e),
     warning: Color32::from_rgb(0xe8, 0xa9, 0x4c),
     error: Color32::from_rgb(0xff, 0x7b, 0x72),
+    primary: Color32::from_rgb(0x2d, 0x6c, 0xc4),
 };
 
 const LIGHT: Colors = Colors {
@@ -86,6 +89,7 @@ const LIGHT: Colors = Colors {
     faint: Color32::from_rgb(0xec, 0xee, 0xf1),
     warning: Color32::from_rgb(0x8f, 0x54, 0x00),
     error: Color32::from_rgb(0xb4, 0x23, 0x18),
+    primary: Color32::from_rgb(0x1a, 0x5f, 0xb4),
 };
 
 fn colors(dark: bool) -> &'static Colors {
@@ -168,6 +172,8 @@ fn visuals(theme: Theme) -> egui::Visuals {
         state.corner_radius = CornerRadius::same(4);
         state.expansion = 0.0;
     }
+    // What has the keyboard looks active; the frame tells it apart from what is only pressed or chosen.
+    widgets.active.bg_stroke = Stroke::new(1.5, colors.accent);
     visuals
 }
 
@@ -285,12 +291,8 @@ pub fn input_row(ui: &mut Ui, label: &str, tooltip: &str, add_input: impl FnOnce
 
 /// A button for the one thing to do next.
 pub fn primary_button(ui: &Ui, text: &str) -> egui::Button<'static> {
-    let (fill, text_color) = if ui.visuals().dark_mode {
-        (Color32::from_rgb(0x2d, 0x6c, 0xc4), Color32::WHITE)
-    } else {
-        (Color32::from_rgb(0x1a, 0x5f, 0xb4), Color32::WHITE)
-    };
-    egui::Button::new(RichText::new(text.to_owned()).color(text_color)).fill(fill)
+    let fill = colors(ui.visuals().dark_mode).primary;
+    egui::Button::new(RichText::new(text.to_owned()).color(Color32::WHITE)).fill(fill)
 }
 
 /// `1234567` as "1,234,567".
@@ -475,6 +477,18 @@ mod tests {
                 ("warning", colors.warning, colors.panel),
                 ("error", colors.error, colors.panel),
                 ("accent", colors.accent, colors.panel),
+                ("text on field", colors.text, colors.field),
+                ("strong on field", colors.strong_text, colors.field),
+                ("weak on button", colors.weak_text, colors.button),
+                ("weak when hovered", colors.weak_text, colors.button_hovered),
+                ("weak when selected", colors.weak_text, colors.selection),
+                ("text when selected", colors.text, colors.selection),
+                ("weak on stripes", colors.weak_text, colors.faint),
+                ("text on stripes", colors.text, colors.faint),
+                ("warning on field", colors.warning, colors.field),
+                ("error on field", colors.error, colors.field),
+                ("primary button", Color32::WHITE, colors.primary),
+                ("accent on button", colors.accent, colors.button),
             ] {
                 let ratio = contrast(text, back);
                 assert!(ratio >= 4.5, "{what} in the {name} theme has contrast {ratio:.2}");

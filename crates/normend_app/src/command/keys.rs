@@ -206,6 +206,17 @@ pub fn shortcut_text(ctx: &egui::Context, shortcut: &KeyboardShortcut) -> String
         Key::OpenBracket => "[",
         Key::CloseBracket => "]",
         Key::Period => ".",
+        Key::Comma => ",",
+        Key::Semicolon => ";",
+        Key::Colon => ":",
+        Key::Slash => "/",
+        Key::Backslash => "\\",
+        Key::Pipe => "|",
+        Key::Quote => "'",
+        Key::Backtick => "`",
+        Key::Exclamationmark => "!",
+        Key::OpenCurlyBracket => "{",
+        Key::CloseCurlyBracket => "}",
         Key::Questionmark => "?",
         Key::ArrowLeft => "Left arrow",
         Key::ArrowRight => "Right arrow",
@@ -336,6 +347,7 @@ mod tests {
         check(Command::Open, "Ctrl+O");
         check(Command::Redo, "Ctrl+Shift+Z or Ctrl+Y");
         check(Command::SetPivot, ".");
+        check(Command::Preferences, "Ctrl+,");
         check(Command::LargerSplats, "+ or =");
         check(Command::SmallerSplats, "−");
         check(Command::LargerPatch, "]");

@@ -100,13 +100,13 @@ pub fn due(dismissed: &BTreeSet<String>, progress: Progress) -> Option<Card> {
         .find(|card| !dismissed.contains(card.name()) && card.is_due(progress))
 }
 
-/// Shows a hint in the upper left corner of `view`; says whether the user dismisses it.
+/// Shows a hint in the lower right corner of `view`, where nothing else is; says whether the user dismisses it.
 pub fn ui(ui: &Ui, view: Rect, card: Card) -> bool {
     let mut dismissed = false;
     Area::new(Id::unique("hint"))
         .order(Order::Middle)
-        .pivot(Align2::LEFT_TOP)
-        .fixed_pos(view.left_top() + Vec2::splat(SPACE_M))
+        .pivot(Align2::RIGHT_BOTTOM)
+        .fixed_pos(view.right_bottom() - Vec2::splat(SPACE_M))
         .show(ui.ctx(), |ui| {
             theme::card(ui).show(ui, |ui| {
                 ui.set_width(WIDTH);

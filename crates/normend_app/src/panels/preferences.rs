@@ -222,9 +222,12 @@ impl Preferences {
     fn command(&mut self, ui: &mut Ui, keys: &mut Keymap, command: Command) {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = SPACE_XS;
-            let label = egui::Label::new(command.label()).truncate().halign(Align::LEFT);
-            ui.add_sized([NAME_WIDTH, ui.spacing().interact_size.y], label)
-                .on_hover_text(command.tooltip());
+            let size = Vec2::new(NAME_WIDTH, ui.spacing().interact_size.y);
+            ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+                ui.set_min_width(NAME_WIDTH);
+                ui.add(egui::Label::new(command.label()).truncate())
+                    .on_hover_text(command.tooltip());
+            });
             if command == Command::Cancel {
                 ui.label(RichText::new("Escape").weak())
                     .on_hover_text("Escape always cancels; it is no other command's key");

@@ -1,0 +1,230 @@
+//! What makes the editor comfortable, without a window: the palette, hints, messages, the scale, names for all widgets.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests fail as tests do, by panicking")]
+
+#[expect(dead_code, reason = "the other tests of the editor use the rest")]
+#[path = "editor/driver.rs"]
+mod driver;
+
+use egui::accesskit::Role;
+use egui::{Key, Modifiers};
+use egui_kittest::kittest::{NodeT, Queryable};
+use normend_app::SettingsStore;
+use normend_app::command::Command;
+use normend_app::panels::hints::Card;
+use normend_app::settings::{Settings, ThemeChoice};
+
+use driver::{Editor, sphere_with_wrong_cap, start, start_prepared};
+
+fn kept(editor: &Editor) -> Settings {
+    let (store, problem) = SettingsStore::load_from(&editor.folder.path().join("settings"));
+    assert_eq!(problem, None);
+    store.settings
+}
+
+fn find(editor: &mut Editor, letters: &str) {
+    editor.key(Modifiers::COMMAND, Key::P);
+    editor
+        .harness
+        .get_by_role_and_label(Role::TextInput, "Find a command")
+        .type_text(letters);
+    editor.harness.run_steps(2);
+}
+
+fn about_is_open(editor: &Editor) -> bool {
+    editor.shows("An editor for the consistent orientation")
+}
+
+/// The first row of the palette.
+fn first_found(editor: &Editor) -> String {
+    let rows = editor.harness.query_all_by_role(Role::ListBoxOption);
+    rows.min_by(|a, b| a.rect().top().total_cmp(&b.rect().top()))
+        .unwrap()
+        .accesskit_node()
+        .label()
+        .unwrap()
+}
+
+#[test]
+fn the_palette_finds_and_runs_commands() {
+    let Some(mut editor) = start(|_| None) else { return };
+    find(&mut editor, "abo");
+    assert_eq!(first_found(&editor), "About Normend");
+    editor.key(Modifiers::NONE, Key::Enter);
+    assert!(about_is_open(&editor));
+    assert!(!editor.shows("Find a command"));
+    editor.key(Modifiers::NONE, Key::Escape);
+    // What was chosen lately comes first, and is remembered.
+    editor.key(Modifiers::COMMAND, Key::P);
+    assert_eq!(first_found(&editor), "About Normend");
+    assert_eq!(kept(&editor).recent_commands, [Command::About.name()]);
+    editor.key(Modifiers::NONE, Key::Escape);
+    assert!(!editor.shows("Find a command"));
+    // What cannot be done says why, and stays.
+    find(&mut editor, "undo");
+    assert_eq!(first_found(&editor), "Undo: there is nothing to undo");
+    editor.key(Modifiers::NONE, Key::Enter);
+    assert!(editor.shows("Undo: there is nothing to undo"));
+    editor.key(Modifiers::NONE, Key::Escape);
+}
+
+#[test]
+fn the_palette_goes_by_arrows_and_opens_scans_and_modes() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let before = editor.picture();
+    find(&mut editor, "display:");
+    let second = {
+        let mut rows: Vec<_> = editor.harness.query_all_by_role(Role::ListBoxOption).collect();
+        rows.sort_by(|a, b| a.rect().top().total_cmp(&b.rect().top()));
+        rows[1].accesskit_node().label().unwrap()
+    };
+    assert!(second.starts_with("Display: "), "{second}");
+    editor.key(Modifiers::NONE, Key::ArrowDown);
+    editor.key(Modifiers::NONE, Key::Enter);
+    editor.harness.run_steps(10);
+    assert_ne!(editor.picture().rgba, before.rgba);
+    find(&mut editor, "sphere.ply");
+    assert_eq!(first_found(&editor), "Open sphere.ply");
+    editor.key(Modifiers::NONE, Key::Enter);
+    assert!(editor.app().is_busy(), "the scan is opened again");
+    editor.wait_until_oriented();
+}
+
+#[test]
+fn hints_come_one_by_one_and_never_again() {
+    let prepare = |settings: &mut Settings| settings.dismissed_hints.clear();
+    let Some(mut editor) = start_prepared(1.0, prepare, sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    assert!(editor.shows("Look around"));
+    editor.click_button("Got it");
+    assert!(editor.shows("Mend with a click") && !editor.shows("Look around"));
+    assert!(kept(&editor).dismissed_hints.contains(Card::Look.name()));
+    // Who mends needs no hint how.
+    editor.mend();
+    assert!(!editor.shows("Mend with a click"));
+    assert!(editor.shows("finds every command"));
+    editor.click_button("Got it");
+    assert!(!editor.shows("finds every command"));
+    // They come again when they are asked for.
+    find(&mut editor, "hints again");
+    editor.key(Modifiers::NONE, Key::Enter);
+    assert!(editor.shows("Look around"));
+    assert!(kept(&editor).dismissed_hints.is_empty());
+}
+
+#[test]
+fn messages_are_filtered_copied_and_cleared() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    editor.key(Modifiers::COMMAND, Key::Y);
+    assert!(editor.said("Redo: there is nothing to redo."));
+    editor.key(Modifiers::NONE, Key::F2);
+    editor.harness.run_steps(3);
+    assert!(editor.shows("Kept the given normals") && editor.shows("Redo: there is nothing to redo."));
+    editor.click_button("Notes");
+    assert!(!editor.shows("Kept the given normals") && editor.shows("Redo: there is nothing to redo."));
+    editor.harness.get_by_role_and_label(Role::Button, "Copy").click();
+    let copied: Vec<String> = (0..3)
+        .flat_map(|_| {
+            editor.harness.step();
+            let commands = &editor.harness.output().platform_output.commands;
+            let texts = commands.iter().filter_map(|command| match command {
+                egui::OutputCommand::CopyText(text) => Some(text.clone()),
+                _ => None,
+            });
+            texts.collect::<Vec<_>>()
+        })
+        .collect();
+    assert_eq!(copied.len(), 1);
+    assert!(copied[0].ends_with("  Note  Redo: there is nothing to redo.\n"), "{copied:?}");
+    assert!(!copied[0].contains("Kept the given normals"));
+    editor.click_button("Clear");
+    assert!(editor.shows("Nothing was said yet") && editor.app().messages().entries().is_empty());
+}
+
+#[test]
+fn the_interface_is_scaled_in_steps() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let scale = |editor: &Editor| editor.harness.ctx.zoom_factor();
+    for _ in 0..2 {
+        editor.key(Modifiers::COMMAND, Key::Equals);
+    }
+    assert_eq!(scale(&editor), 1.25);
+    assert_eq!(kept(&editor).ui_scale, 1.25);
+    editor.key(Modifiers::COMMAND, Key::Minus);
+    assert_eq!(scale(&editor), 1.1);
+    editor.key(Modifiers::COMMAND, Key::Num0);
+    assert_eq!(scale(&editor), 1.0);
+    // Without Ctrl the same keys are for splats.
+    let before = editor.picture();
+    editor.key(Modifiers::NONE, Key::Plus);
+    editor.harness.run_steps(10);
+    assert_ne!(editor.picture().rgba, before.rgba);
+    assert_eq!(scale(&editor), 1.0);
+}
+
+#[test]
+fn the_status_bar_says_how_the_tool_is_used() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    assert!(!editor.shows("Mend here"));
+    editor.wait_until_oriented();
+    assert!(editor.shows("Click  Mend here"));
+}
+
+#[test]
+fn every_window_has_names_for_its_widgets_in_both_themes() {
+    for theme in [ThemeChoice::Dark, ThemeChoice::Light] {
+        let prepare = |settings: &mut Settings| {
+            settings.theme = theme;
+            settings.dismissed_hints.clear();
+        };
+        let Some(mut editor) = start_prepared(1.0, prepare, sphere_with_wrong_cap) else {
+            return;
+        };
+        editor.wait_until_oriented();
+        let name = theme.label().to_lowercase();
+        check(&mut editor, &format!("editor-{name}"));
+        for (modifiers, key, what) in [
+            (Modifiers::NONE, Key::F1, "sheet"),
+            (Modifiers::NONE, Key::F2, "messages"),
+            (Modifiers::COMMAND, Key::P, "palette"),
+            (Modifiers::COMMAND, Key::E, "export"),
+            (Modifiers::COMMAND | Modifiers::SHIFT, Key::O, "path"),
+            (Modifiers::COMMAND, Key::Comma, "preferences"),
+        ] {
+            editor.key(modifiers, key);
+            check(&mut editor, &format!("{what}-{name}"));
+            if key == Key::Comma {
+                editor.click_button("Keys");
+                editor.click_button("Add a key to Undo");
+                editor.key(Modifiers::COMMAND, Key::E);
+                check(&mut editor, &format!("keys-{name}"));
+            }
+            editor.key(Modifiers::NONE, Key::Escape);
+        }
+    }
+}
+
+/// Checks that every widget has a name. `NORMEND_PICTURES` names a folder that gets a picture to look at.
+fn check(editor: &mut Editor, name: &str) {
+    editor.harness.run_steps(4);
+    editor.harness.check_accessibility();
+    if let Some(folder) = std::env::var_os("NORMEND_PICTURES") {
+        let picture = editor.harness.render().unwrap();
+        picture
+            .save(std::path::Path::new(&folder).join(format!("{name}.png")))
+            .unwrap();
+    }
+}

@@ -1,0 +1,196 @@
+//! The keys of the real editor without a window: recording, conflicts, removing, resetting, keeping, and moving by keyboard alone.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests fail as tests do, by panicking")]
+
+#[expect(dead_code, reason = "the other tests of the editor use the rest")]
+#[path = "editor/driver.rs"]
+mod driver;
+
+use std::collections::BTreeSet;
+
+use egui::accesskit::Role;
+use egui::{Key, KeyboardShortcut, Modifiers};
+use egui_kittest::kittest::{NodeT, Queryable};
+use normend_app::SettingsStore;
+use normend_app::command::{Command, Keymap};
+use normend_app::settings::ThemeChoice;
+
+use driver::{Editor, sphere_with_wrong_cap, start};
+
+fn key(key: Key) -> KeyboardShortcut {
+    KeyboardShortcut::new(Modifiers::NONE, key)
+}
+
+/// The editor with the list of keys open.
+fn start_with_keys() -> Option<Editor> {
+    let mut editor = start(|_| None)?;
+    editor.key(Modifiers::COMMAND, Key::Comma);
+    assert!(editor.shows("Preferences"));
+    editor.click_button("Keys");
+    Some(editor)
+}
+
+fn keys_of(editor: &Editor, command: Command) -> Vec<KeyboardShortcut> {
+    Keymap::of(&editor.harness.ctx).keys(command).to_vec()
+}
+
+fn about_is_open(editor: &Editor) -> bool {
+    editor.shows("An editor for the consistent orientation")
+}
+
+#[test]
+fn a_recorded_key_gives_its_command_and_is_shown_and_kept() {
+    let Some(mut editor) = start_with_keys() else { return };
+    // A command without a key gets one; while it is recorded the key does nothing else.
+    editor.click_button("Add a key to About Normend");
+    assert!(editor.shows("Press the key for “About Normend”"));
+    editor.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::F9);
+    assert!(!about_is_open(&editor));
+    let expect = KeyboardShortcut::new(Modifiers::COMMAND | Modifiers::SHIFT, Key::F9);
+    assert_eq!(keys_of(&editor, Command::About), [expect]);
+    editor.key(Modifiers::NONE, Key::Escape);
+    assert!(!editor.shows("Preferences"));
+    editor.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::F9);
+    assert!(about_is_open(&editor));
+    editor.key(Modifiers::NONE, Key::Escape);
+    // The sheet and the palette show it.
+    editor.key(Modifiers::NONE, Key::F1);
+    assert!(editor.shows("Ctrl+Shift+F9"));
+    editor.key(Modifiers::NONE, Key::Escape);
+    let (kept, problem) = SettingsStore::load_from(&editor.folder.path().join("settings"));
+    assert_eq!(problem, None);
+    assert_eq!(kept.settings.keys.keys(Command::About), [expect]);
+    let text = std::fs::read_to_string(editor.folder.path().join("settings/settings.toml")).unwrap();
+    assert!(
+        text.contains("About = [") && !text.contains("Undo"),
+        "only what differs: {text}"
+    );
+}
+
+#[test]
+fn a_key_of_another_command_is_not_taken_silently() {
+    let Some(mut editor) = start_with_keys() else { return };
+    editor.click_button("Add a key to About Normend");
+    editor.key(Modifiers::COMMAND, Key::E);
+    assert!(editor.shows("Ctrl+E is the key of “Export…”"));
+    assert!(keys_of(&editor, Command::About).is_empty());
+    editor.click_button("Leave it");
+    assert_eq!(keys_of(&editor, Command::Export), Command::Export.default_keys());
+    editor.click_button("Add a key to About Normend");
+    editor.key(Modifiers::COMMAND, Key::E);
+    editor.click_button("Take it for “About Normend”");
+    assert!(keys_of(&editor, Command::Export).is_empty());
+    assert_eq!(keys_of(&editor, Command::About), Command::Export.default_keys());
+    // What belongs to text fields, the focus and Escape is no key of a command.
+    editor.click_button("Add a key to Undo");
+    editor.harness.event(egui::Event::Copy);
+    editor.harness.run_steps(2);
+    assert!(editor.shows("stay with text"));
+    editor.key(Modifiers::NONE, Key::Tab);
+    assert!(editor.shows("Tab moves between buttons"));
+    editor.key(Modifiers::NONE, Key::Escape);
+    assert!(editor.shows("Preferences"), "Escape only ends the recording");
+    assert_eq!(keys_of(&editor, Command::Undo), Command::Undo.default_keys());
+    // Resetting a command takes its keys back; the other has none.
+    editor.harness.get_by_label("Search a command or a key").type_text("export");
+    editor.harness.run_steps(2);
+    editor.click_button("Reset the keys of Export…");
+    assert_eq!(keys_of(&editor, Command::Export), Command::Export.default_keys());
+    assert!(keys_of(&editor, Command::About).is_empty());
+}
+
+#[test]
+fn keys_are_changed_removed_and_reset() {
+    let Some(mut editor) = start_with_keys() else { return };
+    let search = |editor: &mut Editor, text: &str| {
+        editor
+            .harness
+            .get_by_role_and_label(Role::TextInput, "Search a command or a key")
+            .focus();
+        editor.harness.run_steps(1);
+        editor.key(Modifiers::COMMAND, Key::A);
+        editor
+            .harness
+            .get_by_role_and_label(Role::TextInput, "Search a command or a key")
+            .type_text(text);
+        editor.harness.run_steps(2);
+    };
+    search(&mut editor, "flip sources");
+    editor.click_button("Change X of Flip sources");
+    editor.key(Modifiers::NONE, Key::F11);
+    assert_eq!(keys_of(&editor, Command::FlipSources), [key(Key::F11)]);
+    // The list is searched by keys as well.
+    search(&mut editor, "ctrl+y");
+    editor.click_button("Remove Ctrl+Y from Redo");
+    assert_eq!(keys_of(&editor, Command::Redo), Command::Redo.default_keys()[..1]);
+    editor.click_button("Reset all");
+    assert!(Keymap::of(&editor.harness.ctx).is_default());
+    assert_eq!(keys_of(&editor, Command::FlipSources), [key(Key::X)]);
+}
+
+fn theme(editor: &Editor) -> ThemeChoice {
+    let (kept, _) = SettingsStore::load_from(&editor.folder.path().join("settings"));
+    kept.settings.theme
+}
+
+#[test]
+fn lists_are_used_by_keyboard() {
+    let Some(mut editor) = start(|_| None) else { return };
+    editor.key(Modifiers::COMMAND, Key::Comma);
+    // Opened by keyboard: the arrows stay in the list, whatever lies under it.
+    editor.harness.get_by_role_and_label(Role::ComboBox, "Theme").focus();
+    editor.harness.run_steps(2);
+    editor.key(Modifiers::NONE, Key::Enter);
+    for _ in 0..2 {
+        editor.key(Modifiers::NONE, Key::ArrowDown);
+    }
+    assert!(editor.is_focused(Role::Button, ThemeChoice::Light.label()));
+    editor.key(Modifiers::NONE, Key::Enter);
+    assert_eq!(theme(&editor), ThemeChoice::Light);
+    // Opened by a click: nothing has the focus, and the arrows begin at the top.
+    editor.harness.get_by_role_and_label(Role::ComboBox, "Theme").click();
+    editor.harness.run_steps(2);
+    editor.key(Modifiers::NONE, Key::ArrowUp);
+    assert!(editor.is_focused(Role::Button, ThemeChoice::Dark.label()));
+    editor.key(Modifiers::NONE, Key::Enter);
+    assert_eq!(theme(&editor), ThemeChoice::Dark);
+    // Escape closes the list and changes nothing; the window under it stays.
+    editor.harness.get_by_role_and_label(Role::ComboBox, "Theme").click();
+    editor.harness.run_steps(2);
+    editor.key(Modifiers::NONE, Key::Home);
+    editor.key(Modifiers::NONE, Key::Escape);
+    assert_eq!(theme(&editor), ThemeChoice::Dark);
+    assert!(editor.shows("Interface size"));
+}
+
+#[test]
+fn tab_reaches_every_button_in_the_order_they_are_read() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let mut reached = Vec::new();
+    for _ in 0..120 {
+        editor.key(Modifiers::NONE, Key::Tab);
+        let focused = editor
+            .harness
+            .query_all(egui_kittest::kittest::by().predicate(|node| node.is_focused()))
+            .next()
+            .map(|node| {
+                let widget = node.accesskit_node();
+                (widget.role(), widget.label().unwrap_or_default())
+            });
+        let Some(focused) = focused else { continue };
+        if reached.first().is_some_and(|first| *first == focused) {
+            break;
+        }
+        reached.push(focused);
+    }
+    let names: BTreeSet<&str> = reached.iter().map(|(_, label)| label.as_str()).collect();
+    for name in ["File", "Help", "Open…", "Export…", "Undo", "3D view"] {
+        let is_enabled = name != "Undo";
+        assert_eq!(names.contains(name), is_enabled, "{name}: {names:?}");
+    }
+    let place = |name: &str| reached.iter().position(|(_, label)| label == name).unwrap();
+    assert!(place("File") < place("Help") && place("Help") < place("Open…") && place("Open…") < place("Export…"));
+}
