@@ -16,6 +16,7 @@ use egui::{Key, Modifiers, Vec2};
 use egui_kittest::kittest::Queryable;
 use normend_app::command::Command;
 use normend_app::messages::Level;
+use normend_app::panels::side::SideTab;
 use normend_core::{Silent, SourceRule, Start, shapes};
 
 use driver::{
@@ -197,6 +198,7 @@ fn sources_are_selected_flipped_and_removed() {
     assert!(editor.app().availability(Command::RemoveSources).is_err());
 
     // The list selects and removes too.
+    editor.open_tab(SideTab::Sources);
     let row = format!("Point {}", normend_app::theme::thousands(u64::from(point)));
     editor.harness.get_by_label_contains(&row).scroll_to_me();
     editor.harness.run_steps(60);
@@ -252,7 +254,7 @@ fn a_preset_votes_for_sources_that_clicks_overrule() {
         let propagation = app.document().unwrap().propagation();
         !app.is_busy() && propagation.is_some_and(|propagation| !propagation.voted_sources.is_empty())
     });
-    editor.harness.run_steps(2);
+    editor.open_tab(SideTab::Sources);
     assert!(editor.shows("voted for"));
     let document = editor.app().document().unwrap();
     assert!(document.sources().is_empty(), "voted sources are not the user's");

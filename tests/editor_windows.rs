@@ -13,6 +13,7 @@ use std::fs;
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
+use normend_app::panels::side::SideTab;
 use normend_app::messages::Level;
 
 use driver::{sphere_with_wrong_cap, sphere_without_normals, start};
@@ -206,6 +207,7 @@ fn the_newest_source_is_in_sight_in_the_list() {
     editor.wait_until_oriented();
     editor.harness.set_size(egui::Vec2::new(1000.0, 1400.0));
     editor.harness.run_steps(4);
+    editor.open_tab(SideTab::Sources);
     let middle = editor.app().view_rect().center();
     let mut known = std::collections::BTreeSet::new();
     for step in 0..24 {
@@ -221,8 +223,8 @@ fn the_newest_source_is_in_sight_in_the_list() {
                 .get_all_by_label_contains(&row)
                 .next()
                 .map(|node| node.rect());
-            let list = editor.harness.get_by_label("Display").rect();
-            assert!(rect.is_some_and(|rect| rect.bottom() < list.top()), "{row} at {rect:?}");
+            let view = editor.app().view_rect();
+            assert!(rect.is_some_and(|rect| rect.bottom() < view.bottom()), "{row} at {rect:?}");
         }
         known = points;
     }

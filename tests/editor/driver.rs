@@ -12,6 +12,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
 use normend_app::panels::hints::Card;
+use normend_app::panels::side::SideTab;
 use normend_app::settings::Settings;
 use normend_app::{App, SettingsStore, graphics_setup};
 use normend_core::{Silent, shapes};
@@ -94,6 +95,24 @@ impl Editor {
 
     pub fn click_button(&mut self, label: &str) {
         self.harness.get_by_role_and_label(Role::Button, label).click();
+        self.harness.run_steps(2);
+    }
+
+    /// Opens a tab of the side panel.
+    pub fn open_tab(&mut self, tab: SideTab) {
+        self.click_button(tab.label());
+    }
+
+    /// Clicks the row of a list that begins with `text`.
+    pub fn click_row(&mut self, text: &str) {
+        let mut rows = self.harness.query_all_by_role(Role::Button);
+        let row = rows.find(|row| {
+            row.accesskit_node()
+                .label()
+                .is_some_and(|label| label.starts_with(text))
+        });
+        row.unwrap_or_else(|| panic!("no row begins with {text}")).click();
+        drop(rows);
         self.harness.run_steps(2);
     }
 

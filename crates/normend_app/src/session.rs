@@ -35,7 +35,6 @@ impl Session {
     /// A session for a scan that was just read. Given normals are kept as the start: they may come from another
     /// program, and mending them is what the user came for.
     pub fn new(scan: Scan, name: String) -> Self {
-        let document = Document::new(Arc::clone(&scan.cloud), scan.given_normals.clone());
         let parameters = Parameters {
             start: if scan.given_normals.is_some() {
                 Start::Keep
