@@ -20,7 +20,7 @@ use crate::pick::PictureView;
 use crate::read_back::SEEN_BYTES;
 use crate::read_back::{COLOR_BYTES, ReadBack};
 use crate::uniforms::{Has, Shot, radius_scale};
-use crate::{Camera, DrawSettings, IdsRequest, PickRequest, PictureMaker, RenderError, Sphere};
+use crate::{Camera, DrawSettings, IdsRequest, Lens, PickRequest, PictureMaker, RenderError, Sphere};
 
 /// Storage buffers that a shader stage reads, at most: spheres, flags, highlights, colors.
 const STORAGE_BUFFERS: u32 = 4;
@@ -440,6 +440,11 @@ impl SplatRenderer {
     ) -> Option<IdsRequest> {
         let (canvas, drawn) = (self.canvas.as_ref()?, self.drawn?);
         IdsRequest::new(device, queue, &canvas.targets().seen, drawn.view, min, size)
+    }
+
+    /// Where places are in the last picture; `None` before the first.
+    pub fn lens(&self) -> Option<Lens> {
+        self.drawn.map(|drawn| Lens::new(&drawn.view, &drawn.settings.clip))
     }
 
     /// Reads the picture back as RGBA rows from the top, with its width and height; for screenshots and tests. Blocks.

@@ -4,6 +4,7 @@ use glam::{Mat4, UVec2, Vec2, Vec3};
 
 use crate::display_mode::{Compare, Hair, HairLen};
 use crate::gpu_types::{Frame, Look};
+use crate::lens::near_depth;
 use crate::pick::PictureView;
 use crate::{DrawSettings, Projection};
 
@@ -83,12 +84,6 @@ impl Shot {
         let shift = (whole - 2.0 * origin - tile_size) / tile_size * Vec2::new(1.0, -1.0);
         let tile_from_clip = Mat4::from_translation(shift.extend(0.0)) * Mat4::from_scale(scale.extend(1.0));
         let clip = &self.settings.clip;
-        let nearest = if is_perspective {
-            scene_depth.x.max(0.0)
-        } else {
-            scene_depth.x
-        };
-        let near_depth = nearest + clip.near * (scene_depth.y - nearest);
         let [clip_min, clip_max] = clip.bounds.unwrap_or([Vec3::splat(-FAR), Vec3::splat(FAR)]);
         let section = clip
             .section
@@ -111,7 +106,7 @@ impl Shot {
             line_width: self.pixels_per_point,
             stride: self.stride(),
             clip_min,
-            near_depth: if clip.near > 0.0 { near_depth } else { -FAR },
+            near_depth: near_depth(&self.view, clip).unwrap_or(-FAR),
             clip_max,
             plane_words,
             section: section.map_or(Vec3::ZERO, |(_, direction)| direction),

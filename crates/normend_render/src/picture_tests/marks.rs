@@ -283,9 +283,15 @@ fn cuts_leave_out_the_points_beyond_them_alone() {
             for (instance, _) in picture.splats() {
                 let position = cloud.positions[instance as usize];
                 assert!(keeps(&scene, position), "{what}: {position} is cut away");
+                assert!(!scene.renderer.lens().unwrap().cuts(position), "{what}: {position}");
                 n_inner += usize::from(eye_depth(&scene, position) > scene.camera.distance);
             }
             assert!(n_inner > 100, "{what}: the inside is not seen");
+            let lens = scene.renderer.lens().unwrap();
+            let n_cut = cloud.positions.iter().filter(|&&p| lens.cuts(p)).count();
+            let n_left_out = cloud.positions.iter().filter(|&&p| !keeps(&scene, p)).count();
+            // Up to rounding at the border itself.
+            assert!(n_cut.abs_diff(n_left_out) < 20, "{what}: {n_cut} and {n_left_out}");
             if let Some(Hit::Splat { instance, .. }) = scene.pick(SIZE[0] / 2, SIZE[1] / 2) {
                 assert!(keeps(&scene, cloud.positions[instance as usize]), "{what}: picked");
             }
