@@ -26,6 +26,8 @@ mod scalars;
 
 mod stations;
 
+pub mod recipe;
+
 #[cfg(test)]
 mod confidence_tests;
 
@@ -34,7 +36,7 @@ use std::fmt;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DVec3, Vec3};
 use normend_core::progress::Part;
@@ -46,6 +48,7 @@ pub use stations::read_stations;
 
 use crate::new_file::{NewFile, TextStyle, narrowest};
 use crate::ply::PlyLayout;
+use crate::recipe::ScanIdentity;
 use crate::rewrite::{RowNormals, rewrite, write_text};
 use crate::table::{Layout, Values, read_values};
 use crate::value::Scalar;
@@ -124,6 +127,8 @@ struct SourceFile {
     path: Option<PathBuf>,
     bytes: Vec<u8>,
     layout: SourceLayout,
+    /// BLAKE3 of the bytes, once it was asked for.
+    hash: OnceLock<[u8; 32]>,
 }
 
 enum SourceLayout {
@@ -253,6 +258,7 @@ fn read_content(bytes: Vec<u8>, name: &str, path: Option<&Path>, progress: &dyn 
             path: path.map(Path::to_owned),
             bytes,
             layout,
+            hash: OnceLock::new(),
         }),
     })
 }
@@ -291,6 +297,27 @@ impl Scan {
     /// Where it was read from; `None` for [`read_bytes`].
     pub fn path(&self) -> Option<&PathBuf> {
         self.file.path.as_ref()
+    }
+
+    /// What tells this scan from others in recipes; `name` is the file's without folders. The first call hashes the file's bytes,
+    /// some gigabytes a second on all processors; later ones cost nothing.
+    pub fn identity(&self, name: &str) -> ScanIdentity {
+        let hash = || {
+            *blake3::Hasher::new()
+                .update_rayon(&self.file.bytes)
+                .finalize()
+                .as_bytes()
+        };
+        ScanIdentity {
+            name: name.to_owned(),
+            path: self.path().map(|path| {
+                let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+                path.display().to_string()
+            }),
+            n_bytes: self.file.bytes.len() as u64,
+            hash: *self.file.hash.get_or_init(hash),
+            n_points: self.cloud.n_points() as u64,
+        }
     }
 
     /// Writes the file that came in with `normals` (unit, by point of the cloud) to `path`: beside it first, synced,

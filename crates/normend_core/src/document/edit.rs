@@ -122,11 +122,13 @@ pub enum EditKind {
     SetParameters,
     /// [`Edit::SetViewpoints`].
     SetViewpoints,
+    /// The whole state of a recipe, or of older steps that are not told apart any more; recorded only.
+    Recipe,
 }
 
 impl EditKind {
     /// All kinds.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::Mend,
         Self::TurnPatch,
         Self::Seen,
@@ -147,6 +149,7 @@ impl EditKind {
         Self::Accept,
         Self::SetParameters,
         Self::SetViewpoints,
+        Self::Recipe,
     ];
 
     /// The name in files.
@@ -172,6 +175,7 @@ impl EditKind {
             Self::Accept => "accept",
             Self::SetParameters => "parameters",
             Self::SetViewpoints => "viewpoints",
+            Self::Recipe => "recipe",
         }
     }
 
@@ -198,6 +202,7 @@ impl EditKind {
             Self::Accept => "Accept",
             Self::SetParameters => "Parameters",
             Self::SetViewpoints => "Viewpoints",
+            Self::Recipe => "Recipe",
         }
     }
 }

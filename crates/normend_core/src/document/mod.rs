@@ -18,14 +18,18 @@ use crate::sources::{Origin, SourcePatch};
 use crate::{Change, Orientation, Parameters, PointCloud, PointSet, Propagation, Regions, Source, Sources};
 
 mod changes;
+mod components;
 mod edit;
 mod history;
 mod marks;
+mod region_names;
 mod spread;
 mod state;
 mod turned_patches;
 mod viewer;
 
+#[cfg(test)]
+mod component_tests;
 #[cfg(test)]
 mod patch_tests;
 #[cfg(test)]
@@ -35,11 +39,13 @@ mod tests;
 #[cfg(test)]
 mod voted_tests;
 
+pub use components::ComponentSide;
 pub use edit::{Edit, EditError, EditKind, FlipReason};
 pub use history::Step;
 use history::{History, Revisions};
 use marks::Overlay;
 pub use marks::{Mark, Marks};
+pub use region_names::RegionNames;
 pub use state::{State, StateChange};
 use turned_patches::TurnedPatches;
 pub use viewer::Viewer;
@@ -325,14 +331,20 @@ impl Document {
     /// [`EditError`]; the document is unchanged then.
     pub fn apply(&mut self, edit: Edit) -> Result<Change, EditError> {
         let change = self.change_of(&edit)?;
-        Ok(self.perform(edit.kind(), change, true))
+        Ok(self.perform(edit.kind(), change, None))
     }
 
-    /// Makes a change of the state that was recorded before, as one step of the history. Returns what turned.
+    /// Makes a change of the state that was recorded before, as one step of the history that says it turned `n_turned` points.
+    /// Returns what turned now, which is nothing before the first [`Self::install`].
     ///
     /// # Errors
     /// [`EditError`] when the change does not fit the cloud; the document is unchanged then.
-    pub fn apply_recorded(&mut self, kind: EditKind, change: StateChange) -> Result<Change, EditError> {
+    pub fn apply_recorded(
+        &mut self,
+        kind: EditKind,
+        change: StateChange,
+        n_turned: u64,
+    ) -> Result<Change, EditError> {
         if let Some(point) = change.largest_point() {
             self.check_point(point)?;
         }
@@ -343,11 +355,12 @@ impl Document {
         for (point, normal) in sources.chain(marks) {
             check_direction(point, normal)?;
         }
-        Ok(self.perform(kind, change, false))
+        Ok(self.perform(kind, change, Some(n_turned)))
     }
 
-    /// Makes a change and remembers it. Where `takes_along`, marked points turn with their regions.
-    fn perform(&mut self, kind: EditKind, mut change: StateChange, takes_along: bool) -> Change {
+    /// Makes a change and remembers it. A new one takes the marked points of its regions along; one that was recorded has them
+    /// already, and the number of points that it turned.
+    fn perform(&mut self, kind: EditKind, mut change: StateChange, recorded: Option<u64>) -> Change {
         if change.is_empty() {
             return Change::default();
         }
@@ -357,12 +370,12 @@ impl Document {
             self.revisions.signs = self.n_revisions;
         }
         self.n_revisions += 1;
-        let (turned, backward) = make(&mut self.state, self.derived.as_mut(), &mut change, takes_along);
+        let (turned, backward) = make(&mut self.state, self.derived.as_mut(), &mut change, recorded.is_none());
         self.history.record(Step {
             kind,
             forward: change,
             backward,
-            n_turned: turned.n_points(),
+            n_turned: recorded.unwrap_or_else(|| turned.n_points()),
             revisions: [before, self.revisions],
         });
         turned
@@ -464,6 +477,15 @@ impl Document {
     /// All steps that are remembered, in the order they were done, undone ones last; the first [`Self::n_done`] are in force.
     pub fn steps(&self) -> impl Iterator<Item = &Step> {
         self.history.steps()
+    }
+
+    /// The state before the first of the [`Self::steps`]: as opened, unless older steps are forgotten. O(state and history).
+    pub fn state_before_steps(&self) -> State {
+        let mut state = self.state.clone();
+        for step in self.history.steps().take(self.n_done()).collect::<Vec<_>>().into_iter().rev() {
+            state.change(&step.backward);
+        }
+        state
     }
 
     /// How many of the [`Self::steps`] are in force.

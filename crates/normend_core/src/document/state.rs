@@ -51,6 +51,29 @@ pub struct StateChange {
 }
 
 impl StateChange {
+    /// What makes one state of another.
+    pub fn between(before: &State, after: &State) -> Self {
+        let gone = before.sources.iter().map(|source| (source.point, None));
+        let gone = gone.filter(|&(point, _)| !after.sources.contains(point));
+        let new = (after.sources.iter()).filter(|source| before.sources.get(source.point) != Some(source));
+        let mut sources: Vec<_> = gone.chain(new.map(|source| (source.point, Some(*source)))).collect();
+        sources.sort_unstable_by_key(|&(point, _)| point);
+        let gone = before.marks.iter().map(|(point, _)| (point, None));
+        let gone = gone.filter(|&(point, _)| after.marks.get(point).is_none());
+        let new = (after.marks.iter()).filter(|&(point, mark)| before.marks.get(point) != Some(mark));
+        let mut marks: Vec<_> = gone.chain(new.map(|(point, mark)| (point, Some(*mark)))).collect();
+        marks.sort_unstable_by_key(|&(point, _)| point);
+        Self {
+            sources,
+            marks,
+            selected: &before.selected ^ &after.selected,
+            hidden: &before.hidden ^ &after.hidden,
+            accepted: &before.accepted ^ &after.accepted,
+            parameters: (before.parameters != after.parameters).then_some(after.parameters),
+            viewpoints: (before.viewpoints != after.viewpoints).then(|| Arc::clone(&after.viewpoints)),
+        }
+    }
+
     /// Whether it changes nothing.
     pub fn is_empty(&self) -> bool {
         !self.is_of_signs() && self.selected.is_empty() && self.hidden.is_empty() && self.accepted.is_empty()

@@ -48,6 +48,8 @@ fn row(cuts: &[u32], has_patches: bool) -> Document {
         tree: Arc::clone(tree),
         base_regions: Regions::new(Arc::clone(tree), initial_cuts, turned),
         default_sources: vec![0],
+        votes: None,
+        viewpoints: Arc::default(),
         voted_sources: Arc::default(),
         sides: Vec::new(),
         patches: has_patches.then(|| Arc::new(Patches::new(tree, &levels))),
@@ -265,7 +267,7 @@ fn recorded_changes_that_do_not_fit_are_refused() {
     };
     let no_such_point = EditError::NoSuchPoint { point: 8, n_points: 8 };
     assert_eq!(
-        document.apply_recorded(EditKind::Select, far),
+        document.apply_recorded(EditKind::Select, far, 0),
         Err(no_such_point.clone())
     );
     let nowhere = Mark {
@@ -277,6 +279,6 @@ fn recorded_changes_that_do_not_fit_are_refused() {
         ..StateChange::default()
     };
     let no_direction = EditError::NoDirection { point: 3 };
-    assert_eq!(document.apply_recorded(EditKind::Pin, nowhere), Err(no_direction));
+    assert_eq!(document.apply_recorded(EditKind::Pin, nowhere, 0), Err(no_direction));
     assert!(document.next_undo().is_none());
 }

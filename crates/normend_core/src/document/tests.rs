@@ -54,6 +54,8 @@ fn propagation_of(world: &World, normals: &[Vec3]) -> Propagation {
         sides: Vec::new(),
         patches: None,
         voted_sources: Arc::default(),
+        votes: None,
+        viewpoints: Arc::default(),
         evidence: None,
         found_station: None,
         seconds: Vec::new(),
@@ -381,7 +383,7 @@ fn check_session(worlds: &[Setting; 2], acts: Vec<Act>) -> Result<(), TestCaseEr
 fn check_recorded(document: &Document, world: &Setting) -> Result<(), TestCaseError> {
     let mut again = document_of(world.0.n_points);
     for step in document.steps().take(document.n_done()) {
-        again.apply_recorded(step.kind(), step.change().clone()).unwrap();
+        again.apply_recorded(step.kind(), step.change().clone(), step.n_turned()).unwrap();
     }
     again.install(Propagation {
         parameters: again.parameters(),
@@ -389,6 +391,10 @@ fn check_recorded(document: &Document, world: &Setting) -> Result<(), TestCaseEr
     });
     prop_assert_eq!(again.state(), document.state());
     prop_assert_eq!(again.orientation(), document.orientation());
+    let mut state = document.state_before_steps();
+    prop_assert_eq!(&state, &State::default());
+    state.change(&StateChange::between(&state, document.state()));
+    prop_assert_eq!(&state, document.state());
     Ok(())
 }
 
