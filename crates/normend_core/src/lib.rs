@@ -43,6 +43,8 @@ pub mod confidence;
 
 pub mod suspects;
 
+pub mod surroundings;
+
 pub mod document;
 
 pub mod metrics;
@@ -64,3 +66,4 @@ pub use roaring::RoaringBitmap as PointSet;
 pub use side_rule::SideRule;
 pub use sources::{Source, Sources};
 pub use spanning_tree::SpanningTree;
+pub use surroundings::Surroundings;
