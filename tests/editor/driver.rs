@@ -9,7 +9,7 @@ use eframe::egui_wgpu::WgpuSetup;
 use egui::accesskit::Role;
 use egui::{Key, Modifiers, Pos2, Vec2};
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use glam::Vec3;
 use normend_app::panels::hints::Card;
 use normend_app::panels::side::SideTab;
