@@ -24,6 +24,7 @@ use crate::automatic;
 use crate::evidence::{self, Evidence, FoundStation, Known, Origin, Station};
 use crate::progress::Part;
 use crate::side_rule::{Clues, Side};
+use crate::visibility::SortedVotes;
 use crate::{
     Cancelled, EdgeRule, Estimator, Neighbors, Patches, PointCloud, Progress, Regions, RiemannianGraph, SideRule,
     Source, SpanningTree, normals, visibility,
@@ -182,6 +183,10 @@ pub struct Propagation {
     /// The sources that the source rule found, ascending by point; the base regions have them already. A source of the document at
     /// the same point holds instead of one of these.
     pub voted_sources: Arc<Vec<Source>>,
+    /// The votes that the source rule went by, where it did.
+    pub votes: Option<Arc<SortedVotes>>,
+    /// The user's viewpoints that it was made with; empty for the usual ones.
+    pub viewpoints: Arc<[Vec3]>,
     /// The patches that a click can turn; `None` where the tree comes from no agglomeration.
     pub patches: Option<Arc<Patches>>,
     /// The side of each component by [`Parameters::rule`], in the order of the tree's roots. Empty where the default sources
@@ -238,16 +243,21 @@ impl Propagation {
         clock.finish(Stage::Normals);
 
         let votes = given.is_none() && parameters.sources != SourceRule::Highest;
-        let voted_sources = if votes {
+        let (voted_sources, votes) = if votes {
             progress.stage("Looking for sources");
             let part = Part::new(progress, 0.6..0.75);
-            let (rule, views) = (parameters.sources, parameters.views);
-            let votes = visibility::votes(cloud, &neighbors, k_normals, &normals, rule, views, &part)?;
-            let sources = visibility::sources(&votes, &normals, rule, parameters.eta);
+            let rule = parameters.sources;
+            let viewpoints = match known.viewpoints {
+                [] => visibility::viewpoints(cloud, rule, parameters.views),
+                own => own.iter().map(|place| place.as_dvec3()).collect(),
+            };
+            let votes = visibility::votes(cloud, &neighbors, k_normals, &normals, rule, &viewpoints, &part)?;
+            let sorted = SortedVotes::new(&votes, rule);
+            let sources = visibility::sources(&votes, &normals, &sorted, parameters.eta);
             clock.finish(Stage::Sources);
-            sources
+            (sources, Some(Arc::new(sorted)))
         } else {
-            Vec::new()
+            (Vec::new(), None)
         };
 
         progress.stage("Building the graph");
@@ -297,6 +307,8 @@ impl Propagation {
             base_regions,
             default_sources,
             voted_sources: Arc::new(voted_sources),
+            votes,
+            viewpoints: known.viewpoints.into(),
             sides: decided,
             patches: None,
             evidence: None,
@@ -331,6 +343,7 @@ impl Propagation {
         } else {
             None
         };
+        let viewpoints = known.viewpoints;
         let station = found_station.map(|found| Station {
             points: 0..cloud.n_points() as u32,
             position: found.position,
@@ -339,6 +352,7 @@ impl Propagation {
             stations: station.as_ref().map_or(known.stations, slice::from_ref),
             // The file's normals are asked only where the user trusts them.
             given: known.given.filter(|_| parameters.rule == SideRule::Given),
+            viewpoints,
         };
         let part = Part::new(progress, 0.45..0.65);
         let evidence = automatic::gather_evidence(cloud, &neighbors, &splat_radii, &unoriented.normals, known, &part)?;
@@ -393,6 +407,8 @@ impl Propagation {
             base_regions,
             default_sources,
             voted_sources: Arc::default(),
+            votes: None,
+            viewpoints: viewpoints.into(),
             patches: Some(Arc::new(found.patches)),
             sides: decided,
             evidence: Some(Arc::new(found.evidence)),

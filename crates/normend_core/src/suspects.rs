@@ -93,10 +93,29 @@ pub struct Suspect {
     pub votes_against: f32,
 }
 
-/// Finds the suspects among `normals` (`n` by point of `cloud`, with the signs that are in question, zero where there is none).
-///
-/// `automatic` is what the automatic method makes of the same cloud; its own initial normals may be in question too. Returns
-/// `None` when it comes from another method, which leaves nothing to judge by. O(n log n), in parallel, about 60 bytes a point.
+/// What the belief in all that is no suspect rests on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grounds {
+    /// Share of the points whose side the evidence knows, in 0..=1.
+    pub share_known: f64,
+    /// Share that is expected to be right of the most doubtful patch that is no suspect, in 0..=1; 1 without patches.
+    pub weakest: f32,
+    /// Number of components of at least [`LEAST_POINTS`] points.
+    pub n_components: usize,
+    /// How many of them have a side that nothing tells.
+    pub n_undecided: usize,
+}
+
+/// The suspects, and why nothing else is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Findings {
+    /// The most likely and largest first.
+    pub suspects: Vec<Suspect>,
+    /// Why nothing else is.
+    pub grounds: Grounds,
+}
+
+/// Finds the suspects among `normals`; see [`examine`].
 ///
 /// # Errors
 /// [`Cancelled`] when `progress` asks to stop; nothing else.
@@ -107,6 +126,24 @@ pub fn suspects(
     settings: Settings,
     progress: &dyn Progress,
 ) -> Result<Option<Vec<Suspect>>, Cancelled> {
+    let findings = examine(cloud, automatic, normals, settings, progress)?;
+    Ok(findings.map(|findings| findings.suspects))
+}
+
+/// Finds the suspects among `normals` (`n` by point of `cloud`, with the signs that are in question, zero where there is none).
+///
+/// `automatic` is what the automatic method makes of the same cloud; its own initial normals may be in question too. Returns
+/// `None` when it comes from another method, which leaves nothing to judge by. O(n log n), in parallel, about 60 bytes a point.
+///
+/// # Errors
+/// [`Cancelled`] when `progress` asks to stop; nothing else.
+pub fn examine(
+    cloud: &PointCloud,
+    automatic: &Propagation,
+    normals: &[Vec3],
+    settings: Settings,
+    progress: &dyn Progress,
+) -> Result<Option<Findings>, Cancelled> {
     let (Some(sureness), Some(patches)) = (of_points(automatic), &automatic.patches) else {
         return Ok(None);
     };
@@ -131,7 +168,14 @@ pub fn suspects(
     }
     candidates.retain(|candidate| candidate.score >= settings.threshold);
     let by_leaf = by_leaf(patches, &doubts);
-    candidates.extend(doubtful(patches, &by_leaf, &doubts, settings.threshold));
+    let mut most_doubtful = 0.0_f32;
+    for patch in doubtful(patches, &by_leaf, &doubts) {
+        if patch.score >= settings.threshold {
+            candidates.push(patch);
+        } else {
+            most_doubtful = most_doubtful.max(patch.score);
+        }
+    }
     progress.report(0.8)?;
     // Ties by the smallest id, which is a property of the points; regions before patches of the same points.
     candidates.par_sort_by(|a, b| {
@@ -172,7 +216,27 @@ pub fn suspects(
         chosen.push(describe(parts, normals, &found, points, score, kind));
     }
     progress.report(1.0)?;
-    Ok(Some(chosen))
+    Ok(Some(Findings {
+        suspects: chosen,
+        grounds: grounds(automatic, 1.0 - most_doubtful),
+    }))
+}
+
+fn grounds(automatic: &Propagation, weakest: f32) -> Grounds {
+    let tree = &automatic.tree;
+    let sides = tree.roots().iter().zip(&automatic.sides);
+    let of_size: Vec<_> = sides
+        .filter(|(root, _)| tree.subtree(**root).len() >= LEAST_POINTS)
+        .collect();
+    Grounds {
+        share_known: automatic
+            .evidence
+            .as_ref()
+            .map_or(0.0, |evidence| evidence.share_known()),
+        weakest,
+        n_components: of_size.len(),
+        n_undecided: of_size.iter().filter(|(_, side)| side.rule.is_none()).count(),
+    }
 }
 
 /// Where the points of a candidate are listed.
@@ -269,13 +333,8 @@ fn by_leaf(patches: &Patches, doubts: &[u8]) -> Vec<u32> {
     by_leaf
 }
 
-/// The patches of at most half their component whose points are in doubt by the threshold or more.
-fn doubtful<'a>(
-    patches: &'a Patches,
-    by_leaf: &[u32],
-    doubts: &[u8],
-    threshold: f32,
-) -> impl Iterator<Item = Candidate> + 'a {
+/// The patches of at most half their component, with the doubt that their points are in.
+fn doubtful<'a>(patches: &'a Patches, by_leaf: &[u32], doubts: &[u8]) -> impl Iterator<Item = Candidate> + 'a {
     let mut sums = Vec::with_capacity(by_leaf.len() + 1);
     let mut sum = 0_u64;
     sums.push(sum);
@@ -300,7 +359,7 @@ fn doubtful<'a>(
             }
             let leaves = patch.leaves();
             let score = mean(sums[leaves.end as usize] - sums[leaves.start as usize], n_points);
-            (score >= threshold).then(|| Candidate::new(Place::Leaves(leaves), score, Kind::Doubtful))
+            Some(Candidate::new(Place::Leaves(leaves), score, Kind::Doubtful))
         })
 }
 

@@ -305,6 +305,7 @@ fn orient(job: &Job, parameters: Parameters, arguments: &OrientArguments, bar: &
     let known = Known {
         given: scan.given_normals.as_ref().map(|normals| normals.as_slice()),
         stations: &arguments.scanner.stations(&scan)?,
+        ..Known::default()
     };
     let propagation = Propagation::new(&scan.cloud, known, parameters, &Part::new(bar, 0.1..0.9))?;
     seconds

@@ -72,6 +72,7 @@ pub fn run(arguments: &SuspectsArguments) -> anyhow::Result<Outcome> {
     let known = Known {
         given: scan.given_normals.as_ref().map(|normals| normals.as_slice()),
         stations: &arguments.scanner.stations(&scan)?,
+        ..Known::default()
     };
     let usual = Parameters::default();
     let rule = match arguments.rule {

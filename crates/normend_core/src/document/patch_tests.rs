@@ -31,6 +31,8 @@ fn propagation(turned: [bool; 8]) -> Propagation {
         tree: Arc::clone(&world.tree),
         base_regions: Regions::new(Arc::clone(&world.tree), world.initial_cuts.clone(), initially_turned),
         default_sources: vec![0],
+        votes: None,
+        viewpoints: Arc::default(),
         voted_sources: Arc::default(),
         sides: Vec::new(),
         patches: Some(Arc::new(Patches::new(&world.tree, &levels))),

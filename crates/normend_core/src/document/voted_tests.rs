@@ -36,6 +36,8 @@ fn propagation(world: &World, voted: &Signs) -> Propagation {
             .iter()
             .map(|&root| world.tree.order()[root as usize])
             .collect(),
+        votes: None,
+        viewpoints: Arc::default(),
         voted_sources: Arc::new(voted.iter().map(source).collect()),
         sides: Vec::new(),
         patches: None,

@@ -41,11 +41,16 @@ pub struct Known<'a> {
     pub given: Option<&'a [Vec3]>,
     /// Where the scanner stood.
     pub stations: &'a [Station],
+    /// Viewpoints that vote for sources instead of the usual ones, in the cloud's own space; empty for the usual ones.
+    pub viewpoints: &'a [Vec3],
 }
 
 impl<'a> From<Option<&'a [Vec3]>> for Known<'a> {
     fn from(given: Option<&'a [Vec3]>) -> Self {
-        Self { given, stations: &[] }
+        Self {
+            given,
+            ..Self::default()
+        }
     }
 }
 

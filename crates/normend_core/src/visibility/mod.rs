@@ -4,7 +4,9 @@
 
 mod hidden_points;
 mod hull;
+mod sorted_votes;
 mod voting;
 
 pub use hidden_points::{HiddenPoints, visible_points};
-pub use voting::{Vote, sources, votes};
+pub use sorted_votes::SortedVotes;
+pub use voting::{Vote, sources, viewpoints, votes};

@@ -3,9 +3,9 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::HiddenPoints;
+use super::{HiddenPoints, SortedVotes};
 use crate::progress::{Part, Steps};
-use crate::propagation::{ETA, SourceRule, VIEWS};
+use crate::propagation::{SourceRule, VIEWS};
 use crate::sources::Origin;
 use crate::{Cancelled, Neighbors, PointCloud, Progress, Source};
 
@@ -25,13 +25,12 @@ pub struct Vote {
     pub weight: f32,
 }
 
-/// Asks `views` viewpoints about the stored normals of all points.
+/// Asks `viewpoints` (the cloud's own space) about the stored normals of all points.
 ///
 /// * `neighbors` – the first `k` of each row tell how far points are off the surface, the noise that visibility allows for
 /// * `normals` – `n` unit normals of any sign
-/// * `rule` – [`SourceRule::HiddenPoints`]: viewpoints are the corners of the bounding box (then its faces' and edges' centers) and
-///   `m_j` is the direction from a viewpoint to the centroid; otherwise viewpoints are pushed out in the same directions, and `m_ij`
-///   is the direction from the viewpoint to the point
+/// * `rule` – [`SourceRule::HiddenPoints`]: `m_j` is the direction from a viewpoint to the centroid; otherwise `m_ij` is the
+///   direction from the viewpoint to the point
 ///
 /// Returns `n` votes by point, `c_ij = sign(n_i · m_j) exp(−arccos(|n_i · m_j|)² / σ²)` summed over the viewpoints that see the
 /// point. The bounding box follows the axes, so votes turn with the cloud only nearly. O(views · n log n), views in parallel, the
@@ -45,11 +44,10 @@ pub fn votes(
     k: usize,
     normals: &[Vec3],
     rule: SourceRule,
-    views: usize,
+    viewpoints: &[DVec3],
     progress: &dyn Progress,
 ) -> Result<Vec<Vote>, Cancelled> {
     progress.report(0.0)?;
-    let viewpoints = viewpoints(cloud, rule, views.clamp(*VIEWS.start(), *VIEWS.end()));
     let hidden_points = HiddenPoints::new(cloud, noise(cloud, neighbors, k, normals));
     let part = Part::new(progress, 0.05..0.95);
     let steps = Steps::new(&part, viewpoints.len());
@@ -70,7 +68,7 @@ pub fn votes(
         .collect();
     let vote = |(point, &normal): (usize, &Vec3)| {
         let mut vote = Vote::default();
-        for ((seen, &viewpoint), &central) in seen.iter().zip(&viewpoints).zip(&directions) {
+        for ((seen, &viewpoint), &central) in seen.iter().zip(viewpoints).zip(&directions) {
             if seen.contains(point) {
                 let towards = if is_mended {
                     direction(viewpoint, cloud.positions()[point].as_dvec3())
@@ -93,30 +91,11 @@ pub fn votes(
 
 /// The sources that `votes` make of `normals`, ascending by point, each with the direction that points to those who see it.
 ///
-/// With [`SourceRule::HiddenPoints`] those with `C_i` in `[min, min + η]` or `[max − η, max]`, where seen at all (§3.4). With
-/// [`SourceRule::HiddenPointsMended`] the share `eta` of the points that are seen whose votes are surest. O(n).
-pub fn sources(votes: &[Vote], normals: &[Vec3], rule: SourceRule, eta: f32) -> Vec<Source> {
-    let eta = eta.clamp(*ETA.start(), *ETA.end());
-    let is_source: Box<dyn Fn(&Vote) -> bool> = if rule == SourceRule::HiddenPointsMended {
-        let real = |vote: &&Vote| vote.sum.abs() >= REAL && vote.sum.abs() >= UNANIMOUS * vote.weight;
-        let mut strengths: Vec<f32> = votes.iter().filter(real).map(|vote| vote.sum.abs()).collect();
-        let n_seen = votes.iter().filter(|vote| vote.weight > 0.0).count();
-        // At least one, else a small cloud would have none at all.
-        let n_wanted = ((eta * n_seen as f32).round() as usize).clamp(1, strengths.len().max(1));
-        if strengths.is_empty() {
-            return Vec::new();
-        }
-        let last = strengths.len() - n_wanted;
-        let weakest = *strengths.select_nth_unstable_by(last, f32::total_cmp).1;
-        Box::new(move |vote| real(&vote) && vote.sum.abs() >= weakest)
-    } else {
-        let ends = votes.iter().fold((0.0, 0.0), |(min, max): (f32, f32), vote| {
-            (min.min(vote.sum), max.max(vote.sum))
-        });
-        Box::new(move |vote| {
-            (vote.sum < 0.0 && vote.sum <= ends.0 + eta) || (vote.sum > 0.0 && vote.sum >= ends.1 - eta)
-        })
-    };
+/// `sorted` are the same votes and says by which rule. With [`SourceRule::HiddenPoints`] sources are those with `C_i` in
+/// `[min, min + η]` or `[max − η, max]`, where seen at all (§3.4). With [`SourceRule::HiddenPointsMended`] the share `eta` of the
+/// points that are seen whose votes are surest. O(n).
+pub fn sources(votes: &[Vote], normals: &[Vec3], sorted: &SortedVotes, eta: f32) -> Vec<Source> {
+    let thresholds = sorted.thresholds(eta);
     let as_source = |(point, vote): (u32, &Vote)| Source {
         point,
         normal: normals[point as usize] * -vote.sum.signum(),
@@ -125,20 +104,15 @@ pub fn sources(votes: &[Vote], normals: &[Vec3], rule: SourceRule, eta: f32) -> 
     };
     (0..)
         .zip(votes)
-        .filter(|(_, vote)| is_source(vote))
+        .filter(|(_, vote)| sorted.is_source(vote, thresholds))
         .map(as_source)
         .collect()
 }
 
-/// The weakest vote that is one: as much as a single viewpoint at 60° says.
-const REAL: f32 = 0.018;
-
-/// The share of what is said that must agree: a point that is seen from both sides is on a thin sheet, or seen through a hole.
-const UNANIMOUS: f32 = 0.9;
-
-/// The first `views` of the corners, face centers and edge centers of the bounding box, in this order, opposite ones one after the
-/// other.
-fn viewpoints(cloud: &PointCloud, rule: SourceRule, views: usize) -> Vec<DVec3> {
+/// The usual viewpoints, in the cloud's own space: the first `views` (within [`VIEWS`]) of the corners, face centers and edge
+/// centers of the bounding box, in this order, opposite ones one after the other. With [`SourceRule::HiddenPointsMended`] they
+/// are pushed out in the same directions.
+pub fn viewpoints(cloud: &PointCloud, rule: SourceRule, views: usize) -> Vec<DVec3> {
     const HALF: [[f64; 3]; 13] = [
         [1.0, 1.0, 1.0],
         [1.0, -1.0, -1.0],
@@ -164,7 +138,7 @@ fn viewpoints(cloud: &PointCloud, rule: SourceRule, views: usize) -> Vec<DVec3> 
     HALF.iter()
         .map(|&direction| DVec3::from(direction))
         .flat_map(|direction| [direction, -direction])
-        .take(views)
+        .take(views.clamp(*VIEWS.start(), *VIEWS.end()))
         .map(place)
         .collect()
 }
@@ -221,7 +195,8 @@ mod tests {
     fn vote_on(shape: &shapes::Shape, rule: SourceRule) -> (PointCloud, Vec<Vote>) {
         let cloud = PointCloud::new(DVec3::ZERO, shape.positions.clone()).unwrap();
         let neighbors = Neighbors::find(&cloud, 12, &Silent).unwrap();
-        let votes = votes(&cloud, &neighbors, 12, &shape.normals, rule, 8, &Silent).unwrap();
+        let viewpoints = viewpoints(&cloud, rule, 8);
+        let votes = votes(&cloud, &neighbors, 12, &shape.normals, rule, &viewpoints, &Silent).unwrap();
         (cloud, votes)
     }
 
@@ -274,7 +249,8 @@ mod tests {
         for shape in [shapes::sphere(3000), shapes::torus(6000), shapes::fandisk_like(8000)] {
             let shape = mixed(shape);
             let (_, votes) = vote_on(&shape, SourceRule::HiddenPointsMended);
-            let found = sources(&votes, &shape.normals, SourceRule::HiddenPointsMended, 0.07);
+            let sorted = SortedVotes::new(&votes, SourceRule::HiddenPointsMended);
+            let found = sources(&votes, &shape.normals, &sorted, 0.07);
             assert!(found.len() > 100, "{}", found.len());
             let outward = |source: &&Source| {
                 let point = source.point as usize;
@@ -289,8 +265,9 @@ mod tests {
         let vote = |sum: f32| Vote { sum, weight: sum.abs() };
         let votes: Vec<Vote> = [-1.0, -0.95, -0.8, -0.0, 0.0, 0.4, 0.45, 0.5].map(vote).to_vec();
         let normals = vec![Vec3::Z; votes.len()];
+        let sorted = SortedVotes::new(&votes, SourceRule::HiddenPoints);
         let of = |eta| -> Vec<(u32, f32)> {
-            let found = sources(&votes, &normals, SourceRule::HiddenPoints, eta);
+            let found = sources(&votes, &normals, &sorted, eta);
             found.iter().map(|source| (source.point, source.normal.z)).collect()
         };
         assert_eq!(of(0.0), [(0, 1.0), (7, -1.0)]);
@@ -310,13 +287,15 @@ mod tests {
         };
         let votes: Vec<Vote> = (0..101).map(vote).collect();
         let normals = vec![Vec3::Z; votes.len()];
-        let of = |eta| sources(&votes, &normals, SourceRule::HiddenPointsMended, eta);
+        let sorted = SortedVotes::new(&votes, SourceRule::HiddenPointsMended);
+        let of = |eta| sources(&votes, &normals, &sorted, eta);
         // 100 are seen; 99 is not unanimous.
         let points: Vec<u32> = of(0.03).iter().map(|source| source.point).collect();
         assert_eq!(points, [97, 98, 100]);
         assert_eq!(of(0.0).len(), 1);
         assert_eq!(of(1.0).len(), 98);
-        assert!(sources(&votes[..1], &normals, SourceRule::HiddenPointsMended, 0.5).is_empty());
+        let silent = SortedVotes::new(&votes[..1], SourceRule::HiddenPointsMended);
+        assert!(sources(&votes[..1], &normals, &silent, 0.5).is_empty());
     }
 
     #[test]

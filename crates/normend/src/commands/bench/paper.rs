@@ -237,9 +237,11 @@ fn purities(
     let stored = normals::estimate(cloud, &neighbors, k_normals, estimator, progress)?;
     let mut purities = [[Purity::default(); ETAS.len()]; RULES.len()];
     for (rule, by_eta) in RULES.into_iter().zip(&mut purities) {
-        let votes = visibility::votes(cloud, &neighbors, k_normals, &stored, rule, views, progress)?;
+        let viewpoints = visibility::viewpoints(cloud, rule, views);
+        let votes = visibility::votes(cloud, &neighbors, k_normals, &stored, rule, &viewpoints, progress)?;
+        let sorted = visibility::SortedVotes::new(&votes, rule);
         for (eta, purity) in ETAS.into_iter().zip(by_eta) {
-            let sources = visibility::sources(&votes, &stored, rule, eta);
+            let sources = visibility::sources(&votes, &stored, &sorted, eta);
             let judged = sources
                 .iter()
                 .filter(|source| right[source.point as usize] != Vec3::ZERO);
