@@ -28,7 +28,8 @@ impl Viewport {
             let pointer = &input.pointer;
             (pointer.primary_pressed(), pointer.primary_down(), pointer.latest_pos())
         });
-        if let Some(position) = position.filter(|_| pressed && response.is_pointer_button_down_on()) {
+        let holds = pressed && response.is_pointer_button_down_on() && !self.is_drawing();
+        if let Some(position) = position.filter(|_| holds) {
             self.hold = self.pixel(position).map(|pixel| Hold {
                 pixel,
                 position,

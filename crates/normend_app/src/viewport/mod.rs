@@ -1,6 +1,7 @@
 //! The 3D view: pointer and camera, the picture, and the marks drawn over it.
 
 mod clip_handles;
+mod drawing;
 mod flight;
 mod fly;
 mod gizmo;
@@ -17,9 +18,11 @@ use normend_render::{Camera, Clip, DrawSettings, Projection, StandardView};
 use crate::pace::Pace;
 use crate::scene_sync::Scene;
 use clip_handles::FaceDrag;
+pub use drawing::{DrawEvent, ViewPlace};
 use flight::Flight;
 use fly::Fly;
 use hold::Hold;
+pub use overlay::{HALO as LINE_HALO, LINE};
 pub use preferences::{Navigation, NavigationSettings, Touchpad};
 
 /// A pixel of the view, physical, from its top left corner.
@@ -78,6 +81,12 @@ pub struct Viewport {
     /// The last scrolling came from fingers on a touchpad.
     is_scroll_of_fingers: bool,
     face_drag: Option<FaceDrag>,
+    /// The main button draws instead of turning the view.
+    draws: bool,
+    /// It is pressed and draws.
+    is_pressed_to_draw: bool,
+    /// What the wheel with Alt turned while a tool draws, in points, until the frame ends.
+    sizing: f32,
 }
 
 /// What the pointer did in the view this frame.
@@ -97,6 +106,12 @@ pub struct PointerOnView {
     pub pivot: Option<Pixel>,
     /// The pivot was asked for by a double-click, whose first click counted as a click.
     pub by_double_click: bool,
+    /// What the main button did for a tool that draws.
+    pub drawn: Vec<DrawEvent>,
+    /// How far the wheel was turned with Alt while a tool draws, in points, away from the user positive.
+    pub sizing: f32,
+    /// The view as a widget, for a menu at the pointer.
+    pub response: Option<egui::Response>,
 }
 
 impl Viewport {
@@ -127,6 +142,9 @@ impl Viewport {
             is_wheel_settling: false,
             is_scroll_of_fingers: false,
             face_drag: None,
+            draws: false,
+            is_pressed_to_draw: false,
+            sizing: 0.0,
         }
     }
 
@@ -348,6 +366,7 @@ impl Viewport {
         response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, "3D view"));
         self.id = Some(response.id);
 
+        let drawn = self.follow_drawing(ui, &response);
         let (steps, chosen) = self.follow_hold(ui, &response);
         let before = (self.camera, settings.clip);
         self.advance(ui);
@@ -357,7 +376,7 @@ impl Viewport {
         settings.clip = self.clip;
         let moved = (self.camera, self.clip) != before;
         let (now, frame_secs) = ui.input(|input| (input.time, input.unstable_dt));
-        let held = response.dragged() || self.face_drag.is_some();
+        let held = (response.dragged() && !self.is_drawing()) || self.face_drag.is_some();
         if let Some(secs) = self.pace.frame(moved, held, now, frame_secs) {
             ui.request_repaint_after(std::time::Duration::from_secs_f64(secs));
         }
@@ -378,7 +397,8 @@ impl Viewport {
             self.picture(ui, texture);
         }
         let moves = self.camera != before.0 && self.flight.is_none() && self.fly.is_none();
-        if (response.dragged() && self.hold.is_none() && self.fly.is_none()) || moves {
+        let drags = response.dragged() && self.hold.is_none() && self.fly.is_none() && !self.is_drawing();
+        if drags || moves {
             self.pivot_mark(ui);
         }
         self.draw_clip_box(ui);
@@ -394,7 +414,8 @@ impl Viewport {
         let clicked_at = response
             .interact_pointer_pos()
             .and_then(|position| self.pixel(position));
-        let double_clicked = response.double_clicked_by(PointerButton::Primary);
+        let clicks = !self.is_for_drawing();
+        let double_clicked = clicks && response.double_clicked_by(PointerButton::Primary);
         let pivot = double_clicked || response.clicked_by(PointerButton::Middle);
         PointerOnView {
             hovered: position
@@ -402,12 +423,15 @@ impl Viewport {
                 .and_then(|position| self.hold.map_or_else(|| self.pixel(position), |hold| Some(hold.pixel))),
             position,
             clicked: clicked_at
-                .filter(|_| response.clicked_by(PointerButton::Primary) && !double_clicked)
+                .filter(|_| clicks && response.clicked_by(PointerButton::Primary) && !double_clicked)
                 .or(chosen),
             steps,
             modifiers: ui.input(|input| input.modifiers),
             pivot: clicked_at.filter(|_| pivot),
             by_double_click: double_clicked,
+            drawn,
+            sizing: std::mem::take(&mut self.sizing),
+            response: Some(response),
         }
     }
 

@@ -65,7 +65,8 @@ impl Viewport {
         };
         let scroll = self.scroll(ui);
         self.is_wheel_settling &= scroll.wheel != 0.0;
-        if self.is_wheel_settling || (self.hold.is_some() && scroll.wheel != 0.0) {
+        // The mask of a figure under way is of the picture as it is.
+        if self.is_drawing() || self.is_wheel_settling || (self.hold.is_some() && scroll.wheel != 0.0) {
             return;
         }
         if scroll.clip != 0.0 {
@@ -75,7 +76,11 @@ impl Viewport {
             self.pan(scroll.pan);
         }
         if scroll.alt && scroll.wheel != 0.0 {
-            settings.splat_scale *= (scroll.wheel / SCROLL_PER_SPLAT_SCALE).exp();
+            if self.is_for_drawing() {
+                self.sizing += scroll.wheel;
+            } else {
+                settings.splat_scale *= (scroll.wheel / SCROLL_PER_SPLAT_SCALE).exp();
+            }
             return;
         }
         let factor = scroll.pinch * (scroll.wheel / SCROLL_PER_ZOOM).exp();
@@ -98,9 +103,9 @@ impl Viewport {
     }
 
     fn follow_drag(&mut self, ui: &Ui, response: &egui::Response, under_pointer: Option<Vec3>) {
-        let (shift, pressed, touches) = ui.input(|input| {
+        let (held, pressed, touches) = ui.input(|input| {
             let pressed = input.pointer.primary_pressed();
-            (input.modifiers.shift, pressed, input.multi_touch().is_some())
+            (input.modifiers, pressed, input.multi_touch().is_some())
         });
         if pressed && response.is_pointer_button_down_on() {
             self.pressed_on = under_pointer;
@@ -112,13 +117,19 @@ impl Viewport {
         if self.hold.is_some_and(|hold| hold.is_choosing) || touches {
             return;
         }
-        let panning = response.dragged_by(PointerButton::Secondary)
-            || response.dragged_by(PointerButton::Middle)
-            || (shift && response.dragged_by(PointerButton::Primary) && self.fly.is_none());
+        if self.is_drawing() {
+            return;
+        }
+        let by = |button| response.dragged_by(button);
+        let draws = self.is_for_drawing();
+        let turns_right = draws && !held.shift && by(PointerButton::Secondary);
+        let panning = (by(PointerButton::Secondary) && !turns_right)
+            || by(PointerButton::Middle)
+            || (held.shift && by(PointerButton::Primary) && self.fly.is_none() && !draws);
         if panning {
             self.pan(delta);
             ui.set_cursor_icon(CursorIcon::Grabbing);
-        } else if response.dragged_by(PointerButton::Primary) {
+        } else if turns_right || by(PointerButton::Primary) {
             if self.fly.is_some() {
                 let pixels = delta * self.pixels_per_point;
                 let size = self.size_in_pixels();

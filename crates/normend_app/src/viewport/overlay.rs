@@ -6,9 +6,9 @@ use super::Viewport;
 use crate::theme::{SPACE_S, SPACE_XS};
 
 /// Behind a light line, so that it is seen on any picture.
-pub(super) const HALO: Color32 = Color32::from_black_alpha(140);
+pub const HALO: Color32 = Color32::from_black_alpha(140);
 /// A line over the picture.
-pub(super) const LINE: Color32 = Color32::from_rgba_premultiplied(230, 230, 230, 230);
+pub const LINE: Color32 = Color32::from_rgba_premultiplied(230, 230, 230, 230);
 
 impl Viewport {
     pub(super) fn picture(&self, ui: &Ui, texture: TextureId) {
