@@ -153,12 +153,53 @@ impl Recipe {
         matches!(self.events.last(), Some(Event::Exported))
     }
 
-    /// The state at the end.
-    pub fn state(&self) -> State {
-        let mut state = State {
+    /// The same without what can be neither taken back nor done again. Where that is still more than `most_bytes`, the oldest steps
+    /// become one. O(size).
+    ///
+    /// # Errors
+    /// As [`Self::encode`].
+    pub fn shortened(&self, most_bytes: usize) -> std::io::Result<Self> {
+        let (steps, n_done) = self.history();
+        let (mut lines, head) = LineWriter::begin(&self.head)?;
+        let sizes = steps.iter().map(|step| {
+            let line = lines.step(step.kind, &step.change, step.n_turned)?;
+            Ok(line.len())
+        });
+        let sizes = sizes.collect::<std::io::Result<Vec<usize>>>()?;
+        let mut n_bytes = head.len() + sizes.iter().sum::<usize>();
+        let (mut n_joined, mut state) = (0, self.first_state());
+        while n_bytes > most_bytes && n_joined < n_done {
+            n_bytes -= sizes[n_joined];
+            state.change(&steps[n_joined].change);
+            n_joined += 1;
+        }
+        let joined = RecordedStep {
+            kind: EditKind::Recipe,
+            change: StateChange::between(&self.first_state(), &state),
+            n_turned: steps[..n_joined].iter().map(|step| step.n_turned).max().unwrap_or_default(),
+        };
+        let joined = Some(joined).filter(|_| n_joined > 0);
+        let kept = steps[n_joined..].iter().map(|&step| step.clone());
+        let undone = std::iter::repeat_n(Event::Undo, steps.len() - n_done);
+        let exported = Some(Event::Exported).filter(|_| self.is_exported());
+        let steps = joined.into_iter().chain(kept).map(Event::Step);
+        Ok(Self {
+            head: self.head.clone(),
+            events: steps.chain(undone).chain(exported).collect(),
+        })
+    }
+
+    /// The state before the first event.
+    fn first_state(&self) -> State {
+        State {
             parameters: self.head.parameters,
             ..State::default()
-        };
+        }
+    }
+
+    /// The state at the end.
+    pub fn state(&self) -> State {
+        let mut state = self.first_state();
         let (steps, n_done) = self.history();
         for step in &steps[..n_done] {
             state.change(&step.change);
@@ -166,16 +207,16 @@ impl Recipe {
         state
     }
 
-    /// The file's content.
+    /// The file's content, and what goes on after it.
     ///
     /// # Errors
     /// None in practice; the encoder promises none.
-    pub fn to_bytes(&self) -> std::io::Result<Vec<u8>> {
+    pub fn encode(&self) -> std::io::Result<(LineWriter, Vec<u8>)> {
         let (mut lines, mut bytes) = LineWriter::begin(&self.head)?;
         for event in &self.events {
             bytes.extend(lines.event(event)?);
         }
-        Ok(bytes)
+        Ok((lines, bytes))
     }
 
     /// Writes the recipe to `path`, whole or not at all. A file that is there is replaced.
@@ -183,7 +224,7 @@ impl Recipe {
     /// # Errors
     /// [`WriteError`]; the target is as it was then.
     pub fn write(&self, path: &Path) -> Result<(), WriteError> {
-        let bytes = self.to_bytes().map_err(WriteError::io(path))?;
+        let (_, bytes) = self.encode().map_err(WriteError::io(path))?;
         crate::write_bytes(path, &bytes)
     }
 }

@@ -146,7 +146,7 @@ fn check_beginning(bytes: &[u8], recipe: &Recipe) -> Result<Option<Reading>, Tes
 proptest! {
     #[test]
     fn what_is_written_is_read_bit_for_bit(recipe in any_recipe(12)) {
-        let bytes = recipe.to_bytes().unwrap();
+        let bytes = recipe.encode().unwrap().1;
         let reading = parse(&bytes, "whole").unwrap();
         prop_assert_eq!(&reading.recipe, &recipe);
         prop_assert_eq!(bits(&reading.recipe), bits(&recipe));
@@ -154,8 +154,22 @@ proptest! {
     }
 
     #[test]
+    fn a_shortened_recipe_has_the_same_steps_and_state(recipe in any_recipe(20), most_bytes in 0..20_000_usize) {
+        let all = recipe.shortened(usize::MAX).unwrap();
+        prop_assert_eq!(all.history(), recipe.history());
+        let few = recipe.shortened(most_bytes).unwrap();
+        prop_assert_eq!(few.state(), recipe.state());
+        prop_assert_eq!(few.is_exported(), recipe.is_exported());
+        let ((steps, n_done), (few, n_few)) = (recipe.history(), few.history());
+        // What was undone can still be done again, and so can the newest steps that have room.
+        prop_assert_eq!(few.len() - n_few, steps.len() - n_done);
+        let n_kept = few.len() - usize::from(few.len() < steps.len());
+        prop_assert_eq!(&few[few.len() - n_kept..], &steps[steps.len() - n_kept..]);
+    }
+
+    #[test]
     fn a_file_that_is_continued_is_one_file(recipe in any_recipe(6), more in prop::collection::vec(any_event(), 0..4)) {
-        let mut bytes = recipe.to_bytes().unwrap();
+        let mut bytes = recipe.encode().unwrap().1;
         let mut reading = parse(&bytes, "first").unwrap();
         for event in &more {
             bytes.extend(reading.writer.event(event).unwrap());
@@ -166,7 +180,7 @@ proptest! {
 
     #[test]
     fn a_file_that_is_cut_off_anywhere_gives_its_beginning(recipe in any_recipe(3)) {
-        let bytes = recipe.to_bytes().unwrap();
+        let bytes = recipe.encode().unwrap().1;
         let n_head = bytes.iter().position(|&byte| byte == b'\n').unwrap();
         // Sets of points make lines long; each of their bytes is like the others.
         for n_kept in (0..bytes.len()).filter(|n_kept| n_kept % (1 + bytes.len() / 2000) == 0) {
@@ -183,7 +197,7 @@ proptest! {
         recipe in any_recipe(6),
         places in prop::collection::vec((any::<prop::sample::Index>(), 1..=255_u8), 1..4),
     ) {
-        let mut bytes = recipe.to_bytes().unwrap();
+        let mut bytes = recipe.encode().unwrap().1;
         for (place, flips) in places {
             let place = place.index(bytes.len());
             bytes[place] ^= flips;
