@@ -85,7 +85,7 @@ fn the_palette_goes_by_arrows_and_opens_scans_and_modes() {
     editor.key(Modifiers::NONE, Key::ArrowDown);
     editor.key(Modifiers::NONE, Key::Enter);
     editor.harness.run_steps(10);
-    assert_ne!(editor.picture().rgba, before.rgba);
+    assert!(editor.picture().rgba != before.rgba);
     find(&mut editor, "sphere.ply");
     assert_eq!(first_found(&editor), "Open sphere.ply");
     editor.key(Modifiers::NONE, Key::Enter);
@@ -169,7 +169,7 @@ fn the_interface_is_scaled_in_steps() {
     let before = editor.picture();
     editor.key(Modifiers::NONE, Key::Plus);
     editor.harness.run_steps(10);
-    assert_ne!(editor.picture().rgba, before.rgba);
+    assert!(editor.picture().rgba != before.rgba);
     assert_eq!(scale(&editor), 1.0);
 }
 
@@ -178,7 +178,6 @@ fn the_status_bar_says_how_the_tool_is_used() {
     let Some(mut editor) = start(sphere_with_wrong_cap) else {
         return;
     };
-    assert!(!editor.shows("Mend here"));
     editor.wait_until_oriented();
     assert!(editor.shows("Click  Mend here"));
 }

@@ -30,6 +30,19 @@ fn start_with_keys() -> Option<Editor> {
     Some(editor)
 }
 
+/// Lists only the commands with this text, so that all of them are in view.
+fn search(editor: &mut Editor, text: &str) {
+    let label = "Search a command or a key";
+    editor.harness.get_by_role_and_label(Role::TextInput, label).focus();
+    editor.harness.run_steps(1);
+    editor.key(Modifiers::COMMAND, Key::A);
+    editor
+        .harness
+        .get_by_role_and_label(Role::TextInput, label)
+        .type_text(text);
+    editor.harness.run_steps(2);
+}
+
 fn keys_of(editor: &Editor, command: Command) -> Vec<KeyboardShortcut> {
     Keymap::of(&editor.harness.ctx).keys(command).to_vec()
 }
@@ -42,6 +55,7 @@ fn about_is_open(editor: &Editor) -> bool {
 fn a_recorded_key_gives_its_command_and_is_shown_and_kept() {
     let Some(mut editor) = start_with_keys() else { return };
     // A command without a key gets one; while it is recorded the key does nothing else.
+    search(&mut editor, "about");
     editor.click_button("Add a key to About Normend");
     assert!(editor.shows("Press the key for “About Normend”"));
     editor.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::F9);
@@ -70,6 +84,7 @@ fn a_recorded_key_gives_its_command_and_is_shown_and_kept() {
 #[test]
 fn a_key_of_another_command_is_not_taken_silently() {
     let Some(mut editor) = start_with_keys() else { return };
+    search(&mut editor, "about normend");
     editor.click_button("Add a key to About Normend");
     editor.key(Modifiers::COMMAND, Key::E);
     assert!(editor.shows("Ctrl+E is the key of “Export…”"));
@@ -82,6 +97,7 @@ fn a_key_of_another_command_is_not_taken_silently() {
     assert!(keys_of(&editor, Command::Export).is_empty());
     assert_eq!(keys_of(&editor, Command::About), Command::Export.default_keys());
     // What belongs to text fields, the focus and Escape is no key of a command.
+    search(&mut editor, "ctrl+z");
     editor.click_button("Add a key to Undo");
     editor.harness.event(egui::Event::Copy);
     editor.harness.run_steps(2);
@@ -92,8 +108,7 @@ fn a_key_of_another_command_is_not_taken_silently() {
     assert!(editor.shows("Preferences"), "Escape only ends the recording");
     assert_eq!(keys_of(&editor, Command::Undo), Command::Undo.default_keys());
     // Resetting a command takes its keys back; the other has none.
-    editor.harness.get_by_label("Search a command or a key").type_text("export");
-    editor.harness.run_steps(2);
+    search(&mut editor, "export…");
     editor.click_button("Reset the keys of Export…");
     assert_eq!(keys_of(&editor, Command::Export), Command::Export.default_keys());
     assert!(keys_of(&editor, Command::About).is_empty());
@@ -102,19 +117,6 @@ fn a_key_of_another_command_is_not_taken_silently() {
 #[test]
 fn keys_are_changed_removed_and_reset() {
     let Some(mut editor) = start_with_keys() else { return };
-    let search = |editor: &mut Editor, text: &str| {
-        editor
-            .harness
-            .get_by_role_and_label(Role::TextInput, "Search a command or a key")
-            .focus();
-        editor.harness.run_steps(1);
-        editor.key(Modifiers::COMMAND, Key::A);
-        editor
-            .harness
-            .get_by_role_and_label(Role::TextInput, "Search a command or a key")
-            .type_text(text);
-        editor.harness.run_steps(2);
-    };
     search(&mut editor, "flip sources");
     editor.click_button("Change X of Flip sources");
     editor.key(Modifiers::NONE, Key::F11);
@@ -147,11 +149,13 @@ fn lists_are_used_by_keyboard() {
     assert!(editor.is_focused(Role::Button, ThemeChoice::Light.label()));
     editor.key(Modifiers::NONE, Key::Enter);
     assert_eq!(theme(&editor), ThemeChoice::Light);
-    // Opened by a click: nothing has the focus, and the arrows begin at the top.
+    // Opened by a click, when egui's own search finds nothing to begin with.
     editor.harness.get_by_role_and_label(Role::ComboBox, "Theme").click();
     editor.harness.run_steps(2);
+    editor.key(Modifiers::NONE, Key::Home);
+    assert!(editor.is_focused(Role::Button, ThemeChoice::System.label()));
     editor.key(Modifiers::NONE, Key::ArrowUp);
-    assert!(editor.is_focused(Role::Button, ThemeChoice::Dark.label()));
+    assert!(editor.is_focused(Role::Button, ThemeChoice::Dark.label()), "past the top comes the end");
     editor.key(Modifiers::NONE, Key::Enter);
     assert_eq!(theme(&editor), ThemeChoice::Dark);
     // Escape closes the list and changes nothing; the window under it stays.

@@ -78,8 +78,9 @@ impl PaletteWindow {
             info.current_text_value = Some(self.text.clone());
             info
         });
-        let entered = ui.input(|input| input.key_pressed(Key::Enter));
-        if !self.focused_once || (entered && field.lost_focus()) {
+        // The field gives the focus away on Enter.
+        let entered = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+        if !self.focused_once || entered {
             field.request_focus();
             self.focused_once = true;
         }
@@ -109,7 +110,7 @@ impl PaletteWindow {
                     if is_chosen && (n_steps != 0 || self.text != before) {
                         response.scroll_to_me(None);
                     }
-                    let meant = response.clicked() || (entered && is_chosen && field.lost_focus());
+                    let meant = response.clicked() || (entered && is_chosen);
                     if meant && entry.blocked.is_none() {
                         decision = Decision::Act(entry.action.clone());
                     }

@@ -81,7 +81,9 @@ impl Preferences {
             });
             pressed
         });
-        self.refusal = None;
+        if pressed.is_some() {
+            self.refusal = None;
+        }
         match pressed {
             None => {}
             Some(Err(reason)) => self.refusal = Some(reason),
