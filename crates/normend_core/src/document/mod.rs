@@ -45,7 +45,7 @@ pub use history::Step;
 use history::{History, Revisions};
 use marks::Overlay;
 pub use marks::{Mark, Marks};
-pub use region_names::RegionNames;
+pub use region_names::{RegionNames, RegionOutline};
 pub use state::{State, StateChange};
 use turned_patches::TurnedPatches;
 pub use viewer::Viewer;

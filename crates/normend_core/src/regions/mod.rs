@@ -212,6 +212,90 @@ impl Regions {
         Change::from_flips(&ranges)
     }
 
+    /// Whether a base region begins at `position`, with or without sources.
+    pub fn is_base_top(&self, position: u32) -> bool {
+        self.initial_tops.contains(position as usize)
+    }
+
+    /// The top of the base region of `point`, as a position.
+    pub fn base_top_of(&self, point: u32) -> u32 {
+        let mut position = self.tree.position(point);
+        while !self.is_base_top(position)
+            && let Some(parent) = self.tree.parent(position)
+        {
+            position = parent;
+        }
+        position
+    }
+
+    /// The tops of regions with a source, ascending, each with the source's point.
+    pub fn source_tops(&self) -> impl Iterator<Item = (u32, u32)> {
+        let point = |&position: &u32| self.tree.order()[position as usize];
+        self.source_by_top.iter().map(move |(&top, source)| (top, point(source)))
+    }
+
+    /// The positions below `top`, itself included, without those below another top in between. A top that is no base region's does not
+    /// count where `counts` is false for its source. O(tops below).
+    pub fn ranges_below(&self, top: u32, counts: impl Fn(u32) -> bool) -> Vec<Range<u32>> {
+        let end = self.tree.subtree(top).end;
+        let (mut start, mut from) = (top, top + 1);
+        let mut ranges = Vec::new();
+        while let Some(nested) = self.tops.next(from).filter(|&nested| nested < end) {
+            from = nested + 1;
+            if self.counts(nested, &counts) {
+                ranges.push(start..nested);
+                start = self.tree.subtree(nested).end;
+                from = start;
+            }
+        }
+        ranges.push(start..end);
+        ranges.retain(|range| !range.is_empty());
+        ranges
+    }
+
+    /// Whether a top is that of a base region, or has a source that counts.
+    fn counts(&self, top: u32, counts: impl Fn(u32) -> bool) -> bool {
+        let source = self.source_by_top.get(&top);
+        self.is_base_top(top) || source.is_none_or(|&source| counts(self.tree.order()[source as usize]))
+    }
+
+    /// For each position of `range` the top of its region, and the point of the region's source, if it has one. Sources for which
+    /// `counts` is false are taken to be none, and their regions to belong to those above. O(positions + depth of the tree).
+    pub fn tops_of(&self, range: Range<u32>, counts: impl Fn(u32) -> bool) -> Vec<(u32, Option<u32>)> {
+        let own = |position: u32| {
+            if !self.tops.contains(position) || !self.counts(position, &counts) {
+                return None;
+            }
+            let source = self.source_by_top.get(&position);
+            let source = source.map(|&source| self.tree.order()[source as usize]);
+            Some((position, source.filter(|&source| counts(source))))
+        };
+        // In preorder the parent of a position is in the range or among the ancestors of its first position.
+        let mut path: Vec<u32> = std::iter::successors(Some(range.start).filter(|_| !range.is_empty()), |&position| {
+            self.tree.parent(position)
+        })
+        .collect();
+        path.reverse();
+        let mut above: Vec<(u32, Option<u32>)> = Vec::with_capacity(path.len());
+        for &position in &path {
+            let top = own(position).or(above.last().copied());
+            above.extend(top);
+        }
+        let mut tops: Vec<(u32, Option<u32>)> = Vec::with_capacity(range.len());
+        for position in range.clone() {
+            let top = own(position).or_else(|| {
+                let parent = self.tree.parent(position)?;
+                match parent.checked_sub(range.start) {
+                    Some(index) => tops.get(index as usize).copied(),
+                    None => above.get(path.binary_search(&parent).ok()?).copied(),
+                }
+            });
+            // A root is a top of its own.
+            tops.push(top.unwrap_or((position, None)));
+        }
+        tops
+    }
+
     /// The top of the region of `position`: its nearest ancestor, or itself, that is a top.
     fn top_of(&self, mut position: u32) -> u32 {
         while !self.tops.contains(position)
