@@ -817,6 +817,60 @@ fn render_draws_right_normals_blue_and_turned_ones_orange() {
         orange_turned > all / 6 && blue_turned < orange_turned / 10,
         "{blue_turned} blue, {orange_turned} orange"
     );
+    // Without its background the picture is clear around the sphere and the same on it.
+    run(
+        &folder,
+        "render right.ply -o clear.png --size 400x300 --view front --transparent",
+    )
+    .expect(0);
+    let with = image::open(folder.path().join("right.png")).unwrap().to_rgba8();
+    let without = image::open(folder.path().join("clear.png")).unwrap().to_rgba8();
+    let n_clear = without.pixels().filter(|pixel| pixel[3] == 0).count();
+    assert!(n_clear > all / 6 && n_clear < all * 5 / 6, "{n_clear}");
+    let pairs = with.pixels().zip(without.pixels());
+    assert!(pairs.filter(|(_, pixel)| pixel[3] != 0).all(|(a, b)| a == b));
+}
+
+#[test]
+fn render_shows_the_colors_of_the_file_or_says_that_there_are_none() {
+    let folder = folder();
+    let truth = sphere(2_000);
+    fs::write(folder.path().join("plain.ply"), ply_of(&truth)).unwrap();
+    let mut colored = ply_of(&truth).replace("end_header\n", "");
+    colored = colored.replace("property float nz\n", "property float nz\nCOLORS");
+    let (header, rows) = colored.split_once("COLORS").unwrap();
+    let mut text = header.to_owned();
+    for name in ["red", "green", "blue"] {
+        writeln!(text, "property uchar {name}").unwrap();
+    }
+    text.push_str("end_header\n");
+    for row in rows.lines() {
+        writeln!(text, "{row} 255 0 0").unwrap();
+    }
+    fs::write(folder.path().join("red.ply"), text).unwrap();
+    let rendered = run(
+        &folder,
+        "render red.ply -o red.png --size 100x80 --mode colors --transparent",
+    );
+    if rendered.code == Some(1) && rendered.err.contains("mesa-vulkan-drivers") {
+        let is_required = std::env::var_os("NORMEND_REQUIRE_GPU").is_some_and(|value| value == "1");
+        assert!(!is_required, "{}", rendered.err);
+        println!("skipped: no graphics adapter");
+        return;
+    }
+    rendered.expect(0);
+    let picture = image::open(folder.path().join("red.png")).unwrap().to_rgba8();
+    let drawn: Vec<_> = picture.pixels().filter(|pixel| pixel[3] != 0).collect();
+    assert!(drawn.len() > 1_000, "{} pixels", drawn.len());
+    assert!(
+        drawn
+            .iter()
+            .all(|pixel| pixel[0] > 30 && pixel[1] == 0 && pixel[2] == 0)
+    );
+    let refused = run(&folder, "render plain.ply -o plain.png --mode colors").expect(1);
+    for word in ["plain.ply", "no colors", "--mode"] {
+        assert!(refused.err.contains(word), "no {word:?} in {}", refused.err);
+    }
 }
 
 #[test]

@@ -53,6 +53,10 @@ pub struct Arguments {
 
     /// Scan to open in the editor: PLY, or XYZ text
     pub scan: Option<PathBuf>,
+
+    /// Restore the edits of the scan that were not exported, without asking
+    #[arg(long, requires = "scan")]
+    pub restore: bool,
 }
 
 impl Arguments {
@@ -357,7 +361,8 @@ set, Mesa itself complains of that on standard error, and draws all the same). A
 
 Examples:
   normend render oriented.ply -o picture.png
-  normend render oriented.ply -o top.png --size 1920x1080 --view top --palette paper")]
+  normend render oriented.ply -o top.png --size 1920x1080 --view top --palette paper
+  normend render oriented.ply -o figure.png --size 7680x4320 --mode lit --transparent")]
 pub struct RenderArguments {
     /// Scan to draw: PLY, or XYZ text
     pub input: PathBuf,
@@ -370,7 +375,7 @@ pub struct RenderArguments {
     #[arg(long, value_name = "WxH", default_value_t = PictureSize::default())]
     pub size: PictureSize,
 
-    /// Coloring of the splats
+    /// Coloring of the splats; colors are those of the file
     #[arg(long, value_name = "NAME", value_parser = one_of(&DisplayMode::ALL, DisplayMode::name), default_value = DisplayMode::default().name())]
     pub mode: DisplayMode,
 
@@ -381,6 +386,10 @@ pub struct RenderArguments {
     /// Colors of front and back
     #[arg(long, value_name = "NAME", value_parser = one_of(&PaletteName::ALL, PaletteName::name), default_value = PaletteName::default().name())]
     pub palette: PaletteName,
+
+    /// Leave the background out, for a page of any color
+    #[arg(long)]
+    pub transparent: bool,
 
     /// Allow the picture to replace a file that exists
     #[arg(long)]

@@ -57,5 +57,5 @@ pub(crate) fn near_depth(view: &PictureView, clip: &Clip) -> Option<f32> {
         Projection::Perspective => nearest.max(0.0),
         Projection::Orthographic => nearest,
     };
-    (clip.near > 0.0).then(|| nearest + clip.near * (farthest - nearest))
+    (clip.near > 0.0).then_some(nearest + clip.near * (farthest - nearest))
 }

@@ -7,16 +7,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context, bail};
 use image::{ExtendedColorType, ImageFormat};
-use normend_core::progress::Part;
+use normend_core::progress::{Cancelled, Part};
 use normend_core::{Document, EditError, Parameters, Progress, Propagation, Start};
-use normend_render::{Camera, DrawSettings, HeadlessDevice, Palette, SplatRenderer};
+use normend_render::{
+    Camera, DisplayMode, DrawSettings, HeadlessDevice, MAX_PICTURE_SIDE, Palette, RenderError, SplatRenderer,
+};
 
 use super::{Outcome, check_is_file_name, check_may_write, is_same_file, prepare, title_of, wrong_use};
 use crate::arguments::RenderArguments;
 use crate::console::Bar;
-
-/// Largest side of a picture in pixels: what every graphics adapter can draw to at once (WebGPU's default limit).
-const MAX_SIDE: u32 = 8192;
 
 /// Width and height of a picture in pixels, typed as `1280x800`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +45,7 @@ impl FromStr for PictureSize {
     type Err = String;
 
     fn from_str(typed: &str) -> Result<Self, String> {
-        let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIDE).contains(side));
+        let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_PICTURE_SIDE).contains(side));
         typed
             .split_once(['x', 'X'])
             .and_then(|(width, height)| {
@@ -55,7 +54,7 @@ impl FromStr for PictureSize {
                     height: side(height)?,
                 })
             })
-            .ok_or_else(|| format!("type width and height as 1280x800, each 1 to {MAX_SIDE}"))
+            .ok_or_else(|| format!("type width and height as 1280x800, each 1 to {MAX_PICTURE_SIDE}"))
     }
 }
 
@@ -114,32 +113,43 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<Outcome> {
     // Before the work, so that a missing driver costs no time.
     let graphics = Graphics::open()?;
     let bar = Bar::new(&title_of(&arguments.input), arguments.common.quiet);
-    let document = read_oriented(arguments, &bar)?;
+    let (document, colors) = read_oriented(arguments, &bar)?;
     bar.stage("Drawing");
-    let (size, rgba) = graphics.draw(&document, arguments)?;
+    let rgba = graphics.draw(&document, colors.as_deref(), arguments, &Part::new(&bar, 0.9..1.0))?;
+    let PictureSize { width, height } = arguments.size;
     let mut png = Cursor::new(Vec::new());
     image::write_buffer_with_format(
         &mut png,
         &rgba,
-        size[0],
-        size[1],
+        width,
+        height,
         ExtendedColorType::Rgba8,
         ImageFormat::Png,
     )
     .context("cannot make a PNG of the picture")?;
     normend_io::write_bytes(&arguments.output, png.get_ref())?;
-    bar.say(&format!(
-        "{}: {}x{} pixels",
-        arguments.output.display(),
-        size[0],
-        size[1]
-    ));
+    bar.say(&format!("{}: {width}x{height} pixels", arguments.output.display(),));
     Ok(Outcome::Done)
 }
 
-/// The scan with the normals of its file; points without one get an oriented normal.
-fn read_oriented(arguments: &RenderArguments, bar: &Bar) -> anyhow::Result<Document> {
-    let scan = normend_io::read(&arguments.input, &Part::new(bar, 0.0..0.1))?;
+/// The scan with the normals of its file; points without one get an oriented normal. And the file's colors, where the mode
+/// shows them: RGBA8 by point.
+fn read_oriented(arguments: &RenderArguments, bar: &Bar) -> anyhow::Result<(Document, Option<Vec<u32>>)> {
+    let scan = normend_io::read(&arguments.input, &Part::new(bar, 0.0..0.08))?;
+    let colors = match arguments.mode {
+        DisplayMode::Colors => {
+            let colors = scan
+                .colors(&Part::new(bar, 0.08..0.1))?
+                .with_context(|| format!("{} has no colors: choose another --mode", arguments.input.display()))?;
+            Some(
+                colors
+                    .iter()
+                    .map(|&[r, g, b]| u32::from_le_bytes([r, g, b, 255]))
+                    .collect(),
+            )
+        }
+        DisplayMode::Facing | DisplayMode::Lit | DisplayMode::Normals => None,
+    };
     let given = scan.given_normals.as_ref().map(|normals| normals.as_slice());
     let parameters = Parameters {
         start: Start::Keep,
@@ -148,7 +158,7 @@ fn read_oriented(arguments: &RenderArguments, bar: &Bar) -> anyhow::Result<Docum
     let propagation = Propagation::new(&scan.cloud, given, parameters, &Part::new(bar, 0.1..0.9))?;
     let mut document = Document::new(scan.cloud, scan.given_normals);
     document.install(propagation);
-    Ok(document)
+    Ok((document, colors))
 }
 
 /// A graphics device without a window, and the first thing that went wrong on it.
@@ -171,8 +181,14 @@ impl Graphics {
         Ok(Self { headless, failure })
     }
 
-    /// Width and height, and rows of RGBA from the top.
-    fn draw(&self, document: &Document, arguments: &RenderArguments) -> anyhow::Result<([u32; 2], Vec<u8>)> {
+    /// Rows of RGBA from the top.
+    fn draw(
+        &self,
+        document: &Document,
+        colors: Option<&[u32]>,
+        arguments: &RenderArguments,
+        progress: &dyn Progress,
+    ) -> anyhow::Result<Vec<u8>> {
         let HeadlessDevice { device, queue, .. } = &self.headless;
         let PictureSize { width, height } = arguments.size;
         let cloud = document.cloud();
@@ -192,12 +208,18 @@ impl Graphics {
         };
         let mut renderer = SplatRenderer::new(device);
         renderer.set_cloud(device, queue, cloud.positions(), Some(&normals), radii, None)?;
-        renderer.draw(device, queue, &camera, [width, height], 1.0, &settings);
-        let picture = renderer.read_picture(device, queue);
+        renderer.set_colors(device, colors)?;
+        let size = [width, height];
+        let maker = renderer.picture_maker(device, queue, &camera, size, 1.0, &settings, arguments.transparent);
+        let picture = maker.make(&mut |fraction| progress.report(fraction).is_ok());
         if let Some(failure) = self.failure.lock().unwrap_or_else(PoisonError::into_inner).take() {
             bail!("the graphics driver cannot draw this ({failure}): try a smaller --size");
         }
-        picture.context("the graphics driver gave no picture back")
+        match picture {
+            // The code of the program tells this apart from a failure.
+            Err(RenderError::Canceled) => Err(Cancelled.into()),
+            picture => Ok(picture?),
+        }
     }
 }
 
