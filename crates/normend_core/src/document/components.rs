@@ -1,6 +1,7 @@
 //! Edits of whole components: all of one turns as it is, whatever sources and cuts are in it.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use super::{Derived, Document, Edit, EditError};
 use crate::sources::Origin;
@@ -17,22 +18,60 @@ pub struct ComponentSide {
     pub turned: bool,
 }
 
+/// Who vouches for points of which component, gathered once for many components.
+struct Vouched {
+    /// The positions of sources, of the document and voted, ascending.
+    positions: Vec<u32>,
+    /// By component: the point where a rule has a source.
+    by_rule: BTreeMap<usize, u32>,
+}
+
+impl Vouched {
+    fn new(document: &Document, derived: &Derived) -> Self {
+        let tree = &derived.propagation.tree;
+        let own = &document.state.sources;
+        let is_of_rule = |source: &&Source| matches!(source.origin, Origin::Rule(_)) && source.patch.is_none();
+        let of_rules = own.iter().filter(is_of_rule);
+        let by_rule = of_rules.map(|source| (tree.component(tree.position(source.point)), source.point));
+        let voted = derived.propagation.voted_sources.iter();
+        let points = own
+            .iter()
+            .map(|source| source.point)
+            .chain(voted.map(|source| source.point));
+        let mut positions: Vec<u32> = points.map(|point| tree.position(point)).collect();
+        positions.sort_unstable();
+        positions.dedup();
+        Self {
+            by_rule: by_rule.collect(),
+            positions,
+        }
+    }
+
+    /// The positions in a range.
+    fn within(&self, range: &Range<u32>) -> &[u32] {
+        let [start, end] =
+            [range.start, range.end].map(|end| self.positions.partition_point(|&position| position < end));
+        &self.positions[start..end]
+    }
+}
+
 impl Document {
     /// The edit that shows each of these components the side that a rule found for it: those that must turn do so as they are, and a
-    /// point of each becomes a source of the rule. `None` when there are no components. O(sources and cuts in them).
+    /// point of each becomes a source of the rule. `None` when there are no components. O(sources + cuts in them).
     ///
     /// # Errors
     /// [`EditError::NotReady`].
     pub fn show_sides(&self, sides: &[ComponentSide]) -> Result<Option<Edit>, EditError> {
         let derived = self.derived.as_ref().ok_or(EditError::NotReady)?;
+        let vouched = Vouched::new(self, derived);
         let (mut of_rules, mut others) = (BTreeMap::new(), BTreeMap::new());
         for side in sides {
             let Some(&root) = derived.propagation.tree.roots().get(side.component) else {
                 continue;
             };
-            let point = self.representative(derived, side.component);
+            let point = self.representative(derived, &vouched, side.component);
             if side.turned {
-                self.turn_component(derived, root, point, &mut others);
+                self.turn_component(derived, &vouched, root, point, &mut others);
             }
             others.remove(&point);
             let shown = derived.region_normal(point);
@@ -50,7 +89,7 @@ impl Document {
     }
 
     /// The edit that turns a component as it is: its sources change to the opposite direction, and parts without one get one. `None`
-    /// when there is no such component. O(sources and cuts in it).
+    /// when there is no such component. O(sources + cuts in it).
     ///
     /// # Errors
     /// [`EditError::NotReady`].
@@ -59,9 +98,10 @@ impl Document {
         let Some(&root) = derived.propagation.tree.roots().get(component) else {
             return Ok(None);
         };
+        let vouched = Vouched::new(self, derived);
         let mut sources = BTreeMap::new();
-        let point = self.representative(derived, component);
-        self.turn_component(derived, root, point, &mut sources);
+        let point = self.representative(derived, &vouched, component);
+        self.turn_component(derived, &vouched, root, point, &mut sources);
         // What a rule said is overruled by the user.
         for source in sources.values_mut() {
             if let Origin::Rule(_) = source.origin {
@@ -69,18 +109,6 @@ impl Document {
             }
         }
         Ok(Some(Edit::AddSources(sources.into_values().collect())))
-    }
-
-    /// The points of a component, by id; empty past the last one. O(m log m) for m points.
-    pub fn points_of_component(&self, component: usize) -> PointSet {
-        let tree = self.propagation().map(|propagation| &propagation.tree);
-        let Some((tree, &root)) = tree.and_then(|tree| Some((tree, tree.roots().get(component)?))) else {
-            return PointSet::new();
-        };
-        let positions = tree.subtree(root);
-        let mut points = tree.order()[positions.start as usize..positions.end as usize].to_vec();
-        points.sort_unstable();
-        points.into_iter().collect()
     }
 
     /// The unpinned marks that show another side than their region does: flipping them takes what the user flipped back. O(marks).
@@ -98,14 +126,10 @@ impl Document {
 
     /// The point of a component that stands for it: where a rule has a source already, else the default source, else the first point
     /// that turns no patch of its own.
-    fn representative(&self, derived: &Derived, component: usize) -> u32 {
+    fn representative(&self, derived: &Derived, vouched: &Vouched, component: usize) -> u32 {
         let tree = &derived.propagation.tree;
         let positions = tree.subtree(tree.roots()[component]);
         let points = &tree.order()[positions.start as usize..positions.end as usize];
-        let of_rule = self.state.sources.iter().find(|source| {
-            let is_inside = positions.contains(&tree.position(source.point));
-            is_inside && matches!(source.origin, Origin::Rule(_)) && source.patch.is_none()
-        });
         let turns_patch = |point: u32| {
             self.state
                 .sources
@@ -113,8 +137,8 @@ impl Document {
                 .is_some_and(|source| source.patch.is_some())
         };
         let default = derived.propagation.default_sources.get(component).copied();
+        let of_rule = vouched.by_rule.get(&component).copied();
         of_rule
-            .map(|source| source.point)
             .or(default.filter(|&point| !turns_patch(point)))
             .or_else(|| points.iter().copied().find(|&point| !turns_patch(point)))
             .unwrap_or(points[0])
@@ -122,20 +146,19 @@ impl Document {
 
     /// Adds the sources that turn the component of a root: those that there are, turned, and one for each part without any. The part
     /// of `representative` gets its one there.
-    fn turn_component(&self, derived: &Derived, root: u32, representative: u32, turned: &mut BTreeMap<u32, Source>) {
+    fn turn_component(
+        &self,
+        derived: &Derived,
+        vouched: &Vouched,
+        root: u32,
+        representative: u32,
+        turned: &mut BTreeMap<u32, Source>,
+    ) {
         let propagation = &derived.propagation;
         let tree = &propagation.tree;
         let positions = tree.subtree(root);
-        let own = self.state.sources.iter().map(|source| source.point);
-        let voted = propagation.voted_sources.iter().map(|source| source.point);
-        let mut vouched: Vec<u32> = own
-            .chain(voted)
-            .map(|point| tree.position(point))
-            .filter(|position| positions.contains(position))
-            .collect();
-        vouched.sort_unstable();
-        vouched.dedup();
-        for &position in &vouched {
+        let vouched = vouched.within(&positions);
+        for &position in vouched {
             let point = tree.order()[position as usize];
             let source = match self.state.sources.get(point) {
                 Some(source) => source.opposite_amid_opposite(),
@@ -167,7 +190,7 @@ impl Document {
             open.last().copied()
         };
         let stands_at = tree.position(representative);
-        let mut stops = vouched;
+        let mut stops = vouched.to_vec();
         if let Err(index) = stops.binary_search(&stands_at) {
             stops.insert(index, stands_at);
         }

@@ -40,7 +40,9 @@ impl Mark {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Marks {
     by_point: BTreeMap<u32, Mark>,
-    n_pinned: usize,
+    /// The points that are pinned, and the others.
+    pinned: PointSet,
+    free: PointSet,
 }
 
 impl Marks {
@@ -56,7 +58,17 @@ impl Marks {
 
     /// How many of them are pinned.
     pub fn n_pinned(&self) -> usize {
-        self.n_pinned
+        self.pinned.len() as usize
+    }
+
+    /// The points whose marks are pinned.
+    pub fn pinned(&self) -> &PointSet {
+        &self.pinned
+    }
+
+    /// The points whose marks are not pinned.
+    pub fn free(&self) -> &PointSet {
+        &self.free
     }
 
     /// The mark at `point`.
@@ -80,8 +92,8 @@ impl Marks {
             Some(mark) => self.by_point.insert(point, mark),
             None => self.by_point.remove(&point),
         };
-        self.n_pinned += usize::from(mark.is_some_and(|mark| mark.pinned));
-        self.n_pinned -= usize::from(before.is_some_and(|mark| mark.pinned));
+        set(&mut self.pinned, point, mark.is_some_and(|mark| mark.pinned));
+        set(&mut self.free, point, mark.is_some_and(|mark| !mark.pinned));
         before
     }
 }
@@ -181,10 +193,11 @@ impl Overlay {
     }
 }
 
-fn set(positions: &mut PointSet, position: u32, holds: bool) {
+/// Puts a point or position into a set, or takes it out.
+fn set(members: &mut PointSet, member: u32, holds: bool) {
     if holds {
-        positions.insert(position);
+        members.insert(member);
     } else {
-        positions.remove(position);
+        members.remove(member);
     }
 }
