@@ -27,6 +27,55 @@ struct ChunkBuffers {
     n_points: u32,
 }
 
+/// Colors on the GPU, RGBA8 with red in the lowest byte.
+pub struct ColorBuffer {
+    /// None for no colors at all, because a buffer must not be empty.
+    buffer: Option<wgpu::Buffer>,
+    len: u32,
+}
+
+impl ColorBuffer {
+    /// Uploads `colors`.
+    ///
+    /// # Errors
+    /// [`RenderError::TooManyPoints`], [`RenderError::BufferTooLarge`] and [`RenderError::OutOfMemory`].
+    pub fn new(device: &wgpu::Device, colors: &[u32]) -> Result<Self, RenderError> {
+        let n_points = colors.len();
+        let (needed, limit) = (size_of_val(colors) as u64, binding_limit(device));
+        if n_points > MAX_SPLATS {
+            return Err(RenderError::TooManyPoints {
+                n_points,
+                limit: MAX_SPLATS,
+            });
+        }
+        if needed > limit {
+            return Err(RenderError::BufferTooLarge {
+                what: "colors of the points",
+                needed,
+                limit,
+            });
+        }
+        let out_of_memory = |error: wgpu::Error| RenderError::OutOfMemory {
+            n_points,
+            needed,
+            reason: error.to_string(),
+        };
+        let buffer = match colors {
+            [] => None,
+            colors => Some(storage_buffer(device, "colors", colors).map_err(out_of_memory)?),
+        };
+        Ok(Self {
+            buffer,
+            len: n_points as u32,
+        })
+    }
+
+    /// Bytes uploaded.
+    pub fn n_bytes(&self) -> u64 {
+        u64::from(self.len) * size_of::<u32>() as u64
+    }
+}
+
 /// The points of a cloud: handles, so a clone is cheap and can be drawn in another thread.
 #[derive(Clone)]
 pub struct Chunks(Arc<[ChunkBuffers]>);
@@ -231,40 +280,22 @@ impl CloudBuffers {
         self.bounds
     }
 
-    /// Gives every instance a color, or none: RGBA8 with red in the lowest byte. Returns the bytes uploaded.
+    /// Gives every instance a color, or none.
     ///
     /// # Errors
-    /// [`RenderError::Mismatch`], [`RenderError::BufferTooLarge`] and [`RenderError::OutOfMemory`]; there are no colors
-    /// then.
-    pub fn set_colors(&mut self, device: &wgpu::Device, colors: Option<&[u32]>) -> Result<u64, RenderError> {
-        // The old buffer goes first, so that both need not fit at once.
+    /// [`RenderError::Mismatch`]; there are no colors then.
+    pub fn set_colors(&mut self, colors: Option<ColorBuffer>) -> Result<(), RenderError> {
         self.colors = None;
-        let Some(colors) = colors else { return Ok(0) };
-        if colors.len() != self.n_points as usize {
+        let Some(colors) = colors else { return Ok(()) };
+        if colors.len != self.n_points {
             return Err(RenderError::Mismatch {
                 what: "colors of the points",
                 expected: self.n_points as usize,
-                found: colors.len(),
+                found: colors.len as usize,
             });
         }
-        if colors.is_empty() {
-            return Ok(0);
-        }
-        let (needed, limit) = (size_of_val(colors) as u64, binding_limit(device));
-        if needed > limit {
-            return Err(RenderError::BufferTooLarge {
-                what: "colors of the points",
-                needed,
-                limit,
-            });
-        }
-        let buffer = storage_buffer(device, "colors", colors).map_err(|error| RenderError::OutOfMemory {
-            n_points: colors.len(),
-            needed,
-            reason: error.to_string(),
-        })?;
-        self.colors = Some(buffer);
-        Ok(needed)
+        self.colors = colors.buffer;
+        Ok(())
     }
 
     /// Replaces the colors of the instances from `first` on, as many as there are; nothing without colors. Returns the

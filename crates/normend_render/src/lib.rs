@@ -37,4 +37,4 @@ pub use lens::Lens;
 pub use marks::Sphere;
 pub use pick::{Hit, PickRequest};
 pub use picture_maker::{MAX_PICTURE_SIDE, PictureMaker};
-pub use renderer::{CloudUploader, SplatRenderer, UploadedCloud};
+pub use renderer::{CloudUploader, SplatRenderer, UploadedCloud, UploadedColors};

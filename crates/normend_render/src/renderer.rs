@@ -11,7 +11,7 @@ use glam::{UVec2, Vec3};
 
 use crate::camera::BoundingSphere;
 use crate::canvas::{Canvas, Stage};
-use crate::cloud_buffers::{CloudBuffers, CloudSlices, MAX_CHUNK_POINTS};
+use crate::cloud_buffers::{CloudBuffers, CloudSlices, ColorBuffer, MAX_CHUNK_POINTS};
 use crate::gpu_types::{Flag, SphereMark};
 use crate::marks::{GrowingBuffer, highlight_words};
 use crate::pass::{PICTURE_FORMAT, Passes, SEEN_FORMAT, SURFACE_FORMAT};
@@ -39,6 +39,9 @@ pub struct UploadedCloud {
     bytes: u64,
 }
 
+/// Colors on the GPU, to be handed to [`SplatRenderer::show_colors`].
+pub struct UploadedColors(ColorBuffer);
+
 impl CloudUploader {
     /// Packs and uploads a cloud; arguments and errors are those of [`SplatRenderer::set_cloud`]. O(n), parallel.
     ///
@@ -59,6 +62,15 @@ impl CloudUploader {
         };
         let (buffers, bytes) = CloudBuffers::new(&self.device, &self.layout, slices, self.max_chunk_points)?;
         Ok(UploadedCloud { buffers, bytes })
+    }
+
+    /// Uploads colors in the order of the instances: RGBA8, as [`SplatRenderer::set_colors`] takes them. O(n).
+    ///
+    /// # Errors
+    /// [`RenderError::BufferTooLarge`] (for more points than a fourth of the bytes of the adapter's largest binding),
+    /// [`RenderError::TooManyPoints`] and [`RenderError::OutOfMemory`].
+    pub fn upload_colors(&self, colors: &[u32]) -> Result<UploadedColors, RenderError> {
+        Ok(UploadedColors(ColorBuffer::new(&self.device, colors)?))
     }
 }
 
@@ -274,25 +286,40 @@ impl SplatRenderer {
 
     /// Gives every instance a color for [`crate::DisplayMode::Colors`], or none: RGBA8 with red in the lowest byte,
     /// gamma-encoded; alpha mixes it with the palette's color of surfaces, so 0 says that there is none. Uploads 4 bytes
-    /// a point.
+    /// a point, in O(n): many points are better left to [`CloudUploader::upload_colors`].
     ///
     /// # Errors
-    /// [`RenderError::Mismatch`], [`RenderError::BufferTooLarge`] (above a fourth of the adapter's largest binding in
-    /// points) and [`RenderError::OutOfMemory`]; there are no colors then. All colors without a cloud are a mismatch.
+    /// As [`CloudUploader::upload_colors`] and [`Self::show_colors`]; there are no colors then.
     pub fn set_colors(&mut self, device: &wgpu::Device, colors: Option<&[u32]>) -> Result<(), RenderError> {
-        let Some(cloud) = &mut self.cloud else {
-            return match colors {
-                Some(colors) if !colors.is_empty() => Err(RenderError::Mismatch {
-                    what: "colors of the points",
-                    expected: 0,
-                    found: colors.len(),
-                }),
-                _ => Ok(()),
-            };
-        };
+        // The old ones go first, so that both need not fit at once.
+        self.show_colors(None)?;
+        match colors {
+            Some(colors) => self.show_colors(Some(self.uploader(device).upload_colors(colors)?)),
+            None => Ok(()),
+        }
+    }
+
+    /// Shows `colors` from now on, or none. O(1).
+    ///
+    /// # Errors
+    /// [`RenderError::Mismatch`] when they are not one for each instance; there are no colors then.
+    pub fn show_colors(&mut self, colors: Option<UploadedColors>) -> Result<(), RenderError> {
         self.bindings_are_stale = true;
         self.shade_is_stale = true;
-        self.bytes_uploaded += cloud.set_colors(device, colors)?;
+        let colors = colors.map(|colors| colors.0);
+        let bytes = colors.as_ref().map_or(0, ColorBuffer::n_bytes);
+        match &mut self.cloud {
+            Some(cloud) => cloud.set_colors(colors)?,
+            None if bytes > 0 => {
+                return Err(RenderError::Mismatch {
+                    what: "colors of the points",
+                    expected: 0,
+                    found: bytes as usize / size_of::<u32>(),
+                });
+            }
+            None => {}
+        }
+        self.bytes_uploaded += bytes;
         Ok(())
     }
 

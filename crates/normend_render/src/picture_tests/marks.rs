@@ -167,6 +167,16 @@ fn colors_are_shown_and_updated_and_refused_when_they_do_not_fit() {
     let error = scene.renderer.set_colors(&device, Some(&[red; 7])).unwrap_err();
     assert_eq!(error.to_string(), "colors of the points: expected 20000, found 7");
     assert!(scene.shoot() == lit);
+    // Uploaded in another thread, and shown here.
+    let uploader = scene.renderer.uploader(&device);
+    let colors = std::thread::scope(|scope| {
+        let uploading = std::thread::Builder::new().spawn_scoped(scope, || uploader.upload_colors(&vec![red; 20_000]));
+        uploading.unwrap().join().unwrap().unwrap()
+    });
+    scene.renderer.show_colors(Some(colors)).unwrap();
+    assert!(scene.shoot().splats().all(|(_, color)| is_red(color)));
+    scene.renderer.show_colors(None).unwrap();
+    assert!(scene.shoot() == lit);
     scene.renderer.clear_cloud();
     assert!(matches!(
         scene.renderer.set_colors(&device, Some(&[red])),

@@ -397,6 +397,11 @@ fn limits_of_the_adapter_are_kept_by_chunks_or_told_in_words() {
     let expect = "signs and marks of the points: 1300 bytes are needed in one buffer, and this graphics adapter allows 1280; open fewer points";
     assert_eq!(error.to_string(), expect);
     assert_eq!(scene.shoot().splats().count(), 0);
+    let uploader = scene.renderer.uploader(&scene.gpu.device);
+    assert!(uploader.upload_colors(&[0; 320]).is_ok());
+    let error = uploader.upload_colors(&[0; 321]).err().unwrap();
+    let expect = "colors of the points: 1284 bytes are needed in one buffer, and this graphics adapter allows 1280; open fewer points";
+    assert_eq!(error.to_string(), expect);
 }
 
 #[test]
