@@ -106,6 +106,13 @@ fn is_clipped(position: vec3<f32>, from_eye: vec3<f32>, depth: f32) -> bool {
         || abs(dot(from_eye, frame.section) - frame.section_offset) > frame.section_half;
 }
 
+// Depth from the bits of the clip-space depth.
+fn depth_of(bits: u32) -> f32 {
+    let z = bitcast<f32>(bits);
+    let a = frame.depth_from_clip;
+    return (a.x + a.y * z) / (a.z + a.w * z);
+}
+
 // World length of a pixel at a depth.
 fn pixel_len_at(depth: f32) -> f32 {
     return frame.pixel_len * select(1.0, depth, frame.perspective > 0.5);

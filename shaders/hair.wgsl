@@ -7,6 +7,13 @@ const WIDTH: f32 = 1.5;
 // Part of the color at the root of a hair: the surface below has the same color.
 const ROOT: f32 = 0.3;
 
+// A point is hidden, and has no hair, when something is seen at its pixel that is nearer by more than these: so many
+// lengths of a pixel, and so many radii of its own disc, because those beside it overlap it.
+const HIDDEN_PIXELS: f32 = 3.0;
+const HIDDEN_RADII: f32 = 1.5;
+
+@group(2) @binding(0) var seen: texture_2d<u32>;
+
 struct Vertex {
     @builtin(position) position: vec4<f32>,
     @location(0) color: vec3<f32>,
@@ -29,9 +36,18 @@ fn vertex(@builtin(vertex_index) vertex_index: u32) -> Vertex {
     let to_eye = normalize(select(frame.back, -center, is_perspective));
     let pixel_len = pixel_len_at(depth);
     let center_in_clip = frame.clip_from_eye * vec4<f32>(center, 1.0);
-    let x = (0.5 * center_in_clip.x / center_in_clip.w + 0.5) * frame.size.x;
+    let pixel = (vec2<f32>(0.5, -0.5) * center_in_clip.xy / center_in_clip.w + 0.5) * frame.size;
+    if all(pixel >= vec2<f32>(0.0)) && all(pixel < frame.size) {
+        let there = textureLoad(seen, vec2<i32>(pixel), 0).xy;
+        let radius = unpack_radius(point.packed) * frame.max_radius;
+        let nearer = depth - depth_of(there.y);
+        if there.x != ID_NONE && nearer > HIDDEN_PIXELS * pixel_len + HIDDEN_RADII * radius {
+            out.position = nowhere();
+            return out;
+        }
+    }
     var normal = unpack_normal(point.packed);
-    if has_flag(sign_plane(x), instance) {
+    if has_flag(sign_plane(pixel.x), instance) {
         normal = -normal;
     }
     let is_front = dot(normal, to_eye) > 0.0;

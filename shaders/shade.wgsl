@@ -89,12 +89,6 @@ fn is_selected(id: u32) -> bool {
     return is_splat(id) && has_flag(FLAG_SELECTED, id - 1u);
 }
 
-fn depth_of(bits: u32) -> f32 {
-    let z = bitcast<f32>(bits);
-    let a = frame.depth_from_clip;
-    return (a.x + a.y * z) / (a.z + a.w * z);
-}
-
 struct Ray {
     // Relative to the eye.
     origin: vec3<f32>,

@@ -39,6 +39,7 @@ pub struct Canvas {
     look_buffer: wgpu::Buffer,
     frame_group: wgpu::BindGroup,
     shade_group: wgpu::BindGroup,
+    seen_group: wgpu::BindGroup,
 }
 
 impl Canvas {
@@ -56,12 +57,21 @@ impl Canvas {
         let frame_buffer = uniform("frame", size_of::<Frame>());
         let look_buffer = uniform("look", size_of::<Look>());
         let (frame_group, shade_group) = stage.bind(device, &targets, &frame_buffer, &look_buffer);
+        let seen_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("hair"),
+            layout: &stage.passes.seen_layout,
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::TextureView(&targets.seen_view),
+            }],
+        });
         Self {
             targets,
             frame_buffer,
             look_buffer,
             frame_group,
             shade_group,
+            seen_group,
         }
     }
 
@@ -112,6 +122,7 @@ impl Canvas {
             let mut pass = self.targets.begin_hair(&mut encoder);
             pass.set_pipeline(&stage.passes.hair);
             pass.set_bind_group(0, &self.frame_group, &[]);
+            pass.set_bind_group(2, &self.seen_group, &[]);
             chunks.draw(&mut pass, step, 6);
         }
         queue.submit([encoder.finish()]);

@@ -98,7 +98,7 @@ impl Default for Palette {
     }
 }
 
-/// Normals drawn as short lines from their points, hidden by nearer surfaces.
+/// Normals drawn as short lines from the points that are seen, hidden by nearer surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hair {
     /// How long.

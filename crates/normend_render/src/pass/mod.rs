@@ -27,6 +27,8 @@ pub struct Passes {
     pub frame_layout: wgpu::BindGroupLayout,
     /// Group 1 of the passes that go through points: a chunk of them.
     pub chunk_layout: wgpu::BindGroupLayout,
+    /// Group 2 of the hair: what is seen.
+    pub seen_layout: wgpu::BindGroupLayout,
     /// Discs.
     pub splat: wgpu::RenderPipeline,
     /// Spheres.
@@ -49,11 +51,13 @@ impl Passes {
             wgpu::ShaderStages::VERTEX_FRAGMENT,
             &[Uniform, storage, storage, Uniform],
         );
+        let seen_layout = hair::seen_layout(device);
         Self {
             splat: splat::pipeline(device, &frame_layout, &chunk_layout),
             sphere: sphere::pipeline(device, &frame_layout),
             shade: ShadePass::new(device, &frame_layout),
-            hair: hair::pipeline(device, &frame_layout, &chunk_layout),
+            hair: hair::pipeline(device, &frame_layout, &chunk_layout, &seen_layout),
+            seen_layout,
             chunk_layout,
             frame_layout,
         }
