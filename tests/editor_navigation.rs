@@ -10,6 +10,8 @@ use egui::accesskit::Role;
 use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, PointerButton, Pos2, TouchPhase, Vec2};
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
+use normend_app::command::Command;
+use normend_app::panels::empty;
 use normend_app::panels::side::SideTab;
 use normend_app::settings::Settings;
 use normend_app::viewport::{Navigation, Touchpad};
@@ -245,7 +247,8 @@ fn f_frames_what_is_selected_and_home_frames_all() {
         (camera(&editor).distance / whole.distance - 1.0).abs() < 0.05,
         "nothing is selected: all"
     );
-    editor.key(Modifiers::COMMAND, Key::A);
+    let action = Command::SelectAllSources.into();
+    editor.harness.state_mut().act(action);
     editor.key(Modifiers::NONE, Key::F);
     assert_near(camera(&editor).pivot, position);
     assert!(camera(&editor).distance < 0.3 * whole.distance);
@@ -590,5 +593,19 @@ fn windows_of_any_size_show_the_scan() {
                 "{size}: {seen} in {rect}"
             );
         }
+    }
+}
+
+#[test]
+fn where_files_cannot_be_dropped_the_first_page_says_so() {
+    for can_drop in [true, false] {
+        let page = egui_kittest::Harness::builder()
+            .with_size(Vec2::new(800.0, 600.0))
+            .build_ui(|ui| {
+                empty::ui(ui, &[], can_drop);
+            });
+        let says = |words| page.query_by_label_contains(words).is_some();
+        assert_eq!(says("You can also drop a file"), can_drop);
+        assert_eq!(says("On Wayland, files cannot be dropped"), !can_drop);
     }
 }

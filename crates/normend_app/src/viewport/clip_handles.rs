@@ -249,25 +249,35 @@ impl Viewport {
         let Some(bounds) = self.clip.bounds else { return };
         let painter = ui.painter_at(self.rect);
         let corner = |bits: usize| Vec3::from_array([0, 1, 2].map(|axis| bounds[bits >> axis & 1][axis]));
+        let is_lit = |face: Face| {
+            let response = ui.ctx().read_response(ui.scope_id().with(face.label()));
+            response.is_some_and(|response| response.hovered() || response.dragged() || response.has_focus())
+        };
+        let lit = Face::ALL.into_iter().find(|&face| is_lit(face));
         for bits in 0..8 {
             for axis in [0, 1, 2].into_iter().filter(|axis| bits >> axis & 1 == 0) {
                 let Some(ends) = self.segment(corner(bits), corner(bits | 1 << axis)) else {
                     continue;
                 };
-                painter.line_segment(ends, Stroke::new(2.5, Color32::from_black_alpha(90)));
-                painter.line_segment(ends, Stroke::new(1.0, Color32::from_white_alpha(190)));
+                // The face that a handle moves is framed, so that nobody has to guess it.
+                let is_of_lit =
+                    lit.is_some_and(|face| face.axis != axis && (bits >> face.axis & 1 == 1) == face.is_high);
+                let (width, color) = if is_of_lit {
+                    (2.5, Color32::WHITE)
+                } else {
+                    (1.0, Color32::from_white_alpha(190))
+                };
+                painter.line_segment(ends, Stroke::new(width + 1.5, Color32::from_black_alpha(90)));
+                painter.line_segment(ends, Stroke::new(width, color));
             }
         }
         for face in self.faces_by_depth(bounds) {
             let Some(place) = self.handle_place(face, bounds) else {
                 continue;
             };
-            let response = ui.ctx().read_response(ui.scope_id().with(face.label()));
-            let is_lit =
-                response.is_some_and(|response| response.hovered() || response.dragged() || response.has_focus());
-            let radius = if is_lit { RADIUS + 2.0 } else { RADIUS };
+            let radius = if lit == Some(face) { RADIUS + 2.0 } else { RADIUS };
             painter.circle_filled(place, radius + 1.5, HALO);
-            painter.circle_filled(place, radius, if is_lit { Color32::WHITE } else { LINE });
+            painter.circle_filled(place, radius, if lit == Some(face) { Color32::WHITE } else { LINE });
             painter.circle_filled(place, 0.5 * radius, ui.visuals().selection.bg_fill);
         }
         if let Some(drag) = self.face_drag

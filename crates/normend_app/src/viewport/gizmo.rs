@@ -9,7 +9,7 @@ const REACH: f32 = 32.0;
 /// Radius of the ends, in points: with the gap around them large enough to hit.
 const BALL: f32 = 9.0;
 /// From the view's corner to the middle, in points.
-const MARGIN: f32 = 54.0;
+pub(super) const MARGIN: f32 = 54.0;
 
 struct Axis {
     name: &'static str,

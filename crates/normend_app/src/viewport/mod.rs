@@ -9,6 +9,7 @@ mod hold;
 mod motion;
 mod overlay;
 mod preferences;
+mod section;
 
 use egui::{Modifiers, PointerButton, Pos2, Rect, Sense, Ui, Vec2};
 use glam::{DVec3, Vec3};
@@ -31,7 +32,7 @@ pub type Pixel = [u32; 2];
 /// Points that framing looks at.
 const FRAMED_POINTS: usize = 1 << 18;
 /// The least distance that framing goes to, as a part of the scene's radius: a single point is seen with what is around it.
-const NEAREST_FRAME: f32 = 0.1;
+const NEAREST_FRAME: f32 = 0.2;
 
 /// The box around the scan, in world space.
 #[derive(Clone, Copy, Debug)]
@@ -200,13 +201,23 @@ impl Viewport {
     /// Shows these world positions from the present direction, not closer than makes sense in this scene. No positions change
     /// nothing. O(n), so of very many a part is enough.
     pub fn frame_points(&mut self, points: impl IntoIterator<Item = Vec3> + Clone) {
-        let mut to = self.destination();
-        let before = to;
-        to.frame_points(points, self.aspect());
-        if to != before {
-            to.distance = to.distance.max(NEAREST_FRAME * self.bounds.radius());
-            self.go(to);
+        let empty = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let corners = points.clone().into_iter();
+        let (min, max) = corners.fold(empty, |(min, max), point| (min.min(point), max.max(point)));
+        if !(min.is_finite() && max.is_finite()) {
+            return;
         }
+        let mut to = self.destination();
+        to.frame_points(points, self.aspect());
+        let nearest = NEAREST_FRAME * self.bounds.radius();
+        to.distance = if min == max { nearest } else { to.distance.max(nearest) };
+        self.go(to);
+    }
+
+    /// As [`Self::frame_points`], looking at a part of these `n_points` when they are very many.
+    pub fn frame_some(&mut self, n_points: u64, points: impl Iterator<Item = Vec3> + Clone) {
+        let step = n_points.div_ceil(FRAMED_POINTS as u64).max(1);
+        self.frame_points(points.step_by(step as usize));
     }
 
     /// Brings `point` into the middle, at most `distance` away (world length), seen from the side that `direction` points to from it, if
@@ -340,7 +351,8 @@ impl Viewport {
         self.flight = None;
     }
 
-    fn pixel(&self, position: Pos2) -> Option<Pixel> {
+    /// The pixel at a place of the window; `None` outside of the view.
+    pub fn pixel(&self, position: Pos2) -> Option<Pixel> {
         let pixel = ((position - self.rect.min) * self.pixels_per_point).floor();
         let inside = pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < self.size[0] as f32 && pixel.y < self.size[1] as f32;
         inside.then_some([pixel.x as u32, pixel.y as u32])

@@ -2,7 +2,7 @@
 
 use egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, StrokeKind, TextureId, Ui, Vec2};
 
-use super::Viewport;
+use super::{Viewport, gizmo};
 use crate::theme::{SPACE_S, SPACE_XS};
 
 /// Behind a light line, so that it is seen on any picture.
@@ -27,34 +27,35 @@ impl Viewport {
         }
     }
 
-    /// Says at the top of the view that something is cut away or that keys fly, and how to leave that.
+    /// Says at the bottom of the view that something is cut away or that keys fly, and how to leave that.
     pub(super) fn notices(&self, ui: &Ui) {
-        let mut top = self.rect.top() + SPACE_S;
+        let mut bottom = self.rect.bottom() - SPACE_S;
         if let Some(fly) = &self.fly {
             let text = format!(
-                "Flying at speed {:.2} · W A S D move, E and Q rise and sink, Shift hurries, drag looks, wheel sets the speed, Esc ends",
+                "Flying at speed {:.2} · W A S D move · E Q rise and sink · Shift: faster · drag: look · wheel: speed · Esc: end",
                 fly.speed()
             );
-            top = self.notice(ui, top, &text);
+            bottom = self.notice(ui, bottom, &text);
         }
         if self.clip.near > 0.0 {
             let text = format!(
                 "The nearest {:.0} % is cut away · Ctrl+wheel moves the cut",
                 100.0 * self.clip.near
             );
-            self.notice(ui, top, &text);
+            self.notice(ui, bottom, &text);
         }
     }
 
-    /// One line in the middle, `top` at its upper edge; returns where the next one goes.
-    fn notice(&self, ui: &Ui, top: f32, text: &str) -> f32 {
+    /// One line in the middle, `bottom` at its lower edge; returns where the next one goes.
+    fn notice(&self, ui: &Ui, bottom: f32, text: &str) -> f32 {
         let painter = ui.painter_at(self.rect);
         let color = ui.visuals().strong_text_color();
         let padding = Vec2::new(SPACE_S, SPACE_XS);
-        let max_width = (self.rect.width() - 4.0 * SPACE_S).max(80.0);
+        // Not over the axes in the corner.
+        let max_width = (self.rect.width() - 4.0 * gizmo::MARGIN).max(120.0);
         let galley = painter.layout(text.to_owned(), FontId::proportional(13.0), color, max_width);
         let size = galley.size() + 2.0 * padding;
-        let rect = Align2::CENTER_TOP.anchor_size(Pos2::new(self.rect.center().x, top), size);
+        let rect = Align2::CENTER_BOTTOM.anchor_size(Pos2::new(self.rect.center().x, bottom), size);
         painter.rect(
             rect,
             5.0,
@@ -64,9 +65,13 @@ impl Viewport {
         );
         painter.galley(rect.min + padding, galley, color);
         // Painted text is not there for screen readers.
-        let response = ui.interact(rect, ui.scope_id().with(("notice", top as i32)), egui::Sense::hover());
+        let response = ui.interact(
+            rect,
+            ui.scope_id().with(("notice", bottom as i32)),
+            egui::Sense::hover(),
+        );
         response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Label, true, text));
-        rect.bottom() + SPACE_XS
+        rect.top() - SPACE_XS
     }
 
     /// A few words beside the pointer.
