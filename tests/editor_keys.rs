@@ -148,7 +148,10 @@ fn lists_are_used_by_keyboard() {
     }
     assert!(editor.is_focused(Role::Button, ThemeChoice::Light.label()));
     editor.key(Modifiers::NONE, Key::Enter);
+    editor.harness.run_steps(2);
     assert_eq!(theme(&editor), ThemeChoice::Light);
+    assert!(!egui::Popup::is_any_open(&editor.harness.ctx), "what is chosen closes the list");
+    assert!(editor.is_focused(Role::ComboBox, "Theme"));
     // Opened by a click, when egui's own search finds nothing to begin with.
     editor.harness.get_by_role_and_label(Role::ComboBox, "Theme").click();
     editor.harness.run_steps(2);
@@ -157,6 +160,7 @@ fn lists_are_used_by_keyboard() {
     editor.key(Modifiers::NONE, Key::ArrowUp);
     assert!(editor.is_focused(Role::Button, ThemeChoice::Dark.label()), "past the top comes the end");
     editor.key(Modifiers::NONE, Key::Enter);
+    editor.harness.run_steps(2);
     assert_eq!(theme(&editor), ThemeChoice::Dark);
     // Escape closes the list and changes nothing; the window under it stays.
     editor.harness.get_by_role_and_label(Role::ComboBox, "Theme").click();

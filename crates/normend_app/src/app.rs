@@ -251,7 +251,7 @@ impl App {
         }
         // An open menu or list has the keyboard: Escape closes it, arrows move in it.
         if egui::Popup::is_any_open(&self.ctx) {
-            popup_keys::move_focus(&self.ctx);
+            popup_keys::take(&self.ctx);
             return;
         }
         if self.windows.modal.is_some() {

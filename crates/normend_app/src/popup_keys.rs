@@ -1,12 +1,48 @@
 //! Arrow keys in open menus and lists.
 //!
 //! egui looks for the next widget in the whole window, also under the list, and nowhere while nothing has the focus, as
-//! after a click. Here Up and Down go through the entries of the list that is open, Home and End to its ends.
+//! after a click; and a list stays open when Enter has chosen from it. Here Up and Down go through the entries of the list
+//! that is open, Home and End to its ends, and Enter and the space bar close it, so that the focus is where it was.
 
-use egui::{Context, Id, Key, Modifiers, Order};
+use egui::{Context, Id, Key, LayerId, Modifiers, Order, Popup};
 
-/// Moves the focus in the topmost open popup as the pressed keys say. Enter and Escape are egui's own.
-pub(crate) fn move_focus(ctx: &Context) {
+/// The list and the pass in which a key chose from it, for the pass after it: only then it is known whether the choice
+/// opened a list of its own.
+#[derive(Clone, Copy, Default)]
+struct Chosen(Option<(LayerId, u64)>);
+
+/// What had the focus before the list.
+#[derive(Clone, Copy, Default)]
+struct Opener(Option<Id>);
+
+/// Does in the topmost open popup what the pressed keys say. Choosing and Escape are egui's own.
+pub(crate) fn take(ctx: &Context) {
+    let (top, pass) = (top(ctx), ctx.cumulative_pass_nr());
+    let Chosen(chosen) = ctx.data_mut(|data| data.remove_temp(Id::NULL)).unwrap_or_default();
+    if chosen.is_some_and(|(layer, chosen_pass)| Some(layer) == top && chosen_pass + 1 == pass) {
+        Popup::close_all(ctx);
+        let Opener(opener) = ctx.data_mut(|data| data.remove_temp(Id::NULL)).unwrap_or_default();
+        if let Some(id) = opener {
+            ctx.memory_mut(|memory| memory.request_focus(id));
+        }
+        return;
+    }
+    move_focus(ctx);
+    let is_choosing = ctx.input(|input| input.key_pressed(Key::Enter) || input.key_pressed(Key::Space));
+    let focused = ctx.memory(|memory| memory.focused());
+    if let (true, Some(layer), Some(focused)) = (is_choosing, top, focused)
+        && entries(ctx).contains(&focused)
+    {
+        ctx.data_mut(|data| data.insert_temp(Id::NULL, Chosen(Some((layer, pass)))));
+        ctx.request_repaint();
+    }
+}
+
+fn top(ctx: &Context) -> Option<LayerId> {
+    ctx.memory(|memory| memory.areas().top_layer_id(Order::Foreground))
+}
+
+fn move_focus(ctx: &Context) {
     let step = ctx.input_mut(|input| {
         let mut pressed = |key| input.consume_key(Modifiers::NONE, key);
         // Each key is taken, so that egui's own search does not see it.
@@ -22,6 +58,9 @@ pub(crate) fn move_focus(ctx: &Context) {
     let entries = entries(ctx);
     let focused = ctx.memory(|memory| memory.focused());
     let at = entries.iter().position(|&id| Some(id) == focused);
+    if at.is_none() {
+        ctx.data_mut(|data| data.insert_temp(Id::NULL, Opener(focused)));
+    }
     if let Some(next) = step.from(at, entries.len()) {
         ctx.memory_mut(|memory| {
             memory.move_focus(egui::FocusDirection::None);
@@ -53,9 +92,7 @@ impl Step {
 
 /// What can be chosen in the topmost popup, from top to bottom.
 fn entries(ctx: &Context) -> Vec<Id> {
-    let Some(layer) = ctx.memory(|memory| memory.areas().top_layer_id(Order::Foreground)) else {
-        return Vec::new();
-    };
+    let Some(layer) = top(ctx) else { return Vec::new() };
     ctx.viewport(|viewport| {
         let widgets = viewport.prev_pass.widgets.get_layer(layer);
         let mut entries: Vec<_> = widgets
