@@ -277,6 +277,63 @@ fn can_run(folder: &Path, scan: &str) -> bool {
     false
 }
 
+/// The editor on that display, with everything of its own in `folder` and its log in the file `log`.
+fn editor(folder: &Path, display: &Display) -> Command {
+    let mut editor = Command::new(env!("CARGO_BIN_EXE_normend"));
+    editor
+        .current_dir(folder)
+        .env("DISPLAY", &display.name)
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET")
+        .env("NORMEND_CONFIG_DIR", folder.join("config"))
+        .env("NORMEND_STATE_DIR", folder.join("state"))
+        .env("XDG_RUNTIME_DIR", folder)
+        .env("RUST_LOG", "normend_app=debug")
+        .stdin(Stdio::null())
+        .stderr(fs::File::create(folder.join("log")).unwrap());
+    editor
+}
+
+#[test]
+fn the_editor_comes_back_when_the_graphics_device_is_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    normend(folder, "generate part -o scan.ply --points 20000");
+    normend(folder, "orient scan.ply -o before.ply --preset tree --quiet");
+    if !can_run(folder, "before.ply") {
+        return;
+    }
+    let display = Display::start(folder);
+    let log = || fs::read_to_string(folder.join("log")).unwrap();
+    let mut first = Killed(
+        editor(folder, &display)
+            .arg("before.ply")
+            .env("NORMEND_LOSE_DEVICE", "1")
+            .spawn()
+            .unwrap(),
+    );
+    let status = display.wait_for("the end of the first editor", |_| first.0.try_wait().unwrap());
+    assert!(status.success(), "{status}: {}", log());
+    // The second one is a child of the first; it writes to the same log and ends with the display.
+    display.wait_for("the second editor", |_| {
+        log().contains("so Normend started again with your scan").then_some(())
+    });
+    display.wait_for("the scan in its window", |shot| {
+        let is_front = |[red, _, blue]: &&[u8; 3]| i32::from(*blue) > i32::from(*red) + 40;
+        (shot.rgb.iter().filter(is_front).count() > 5000).then_some(())
+    });
+    let log = log();
+    let n_opened = log.matches("Kept the given normals of 20,000 points").count();
+    assert_eq!(n_opened, 2, "both show the same scan: {log}");
+    // A lost device is no fault of the program, so there is nothing to report.
+    let state = fs::read_dir(folder.join("state")).into_iter().flatten();
+    let names: Vec<_> = state.map(|entry| entry.unwrap().file_name()).collect();
+    let is_report = |name: &std::ffi::OsString| name.to_string_lossy().starts_with("crash-");
+    assert!(!names.iter().any(is_report), "{names:?}");
+    display.xdotool(&["search", "--onlyvisible", "--name", "Normend", "windowfocus", "--sync"]);
+    display.xdotool(&["key", "ctrl+q"]);
+}
+
 #[test]
 fn a_wrong_patch_is_mended_in_the_window() {
     let folder = tempfile::tempdir().unwrap();
@@ -295,21 +352,7 @@ fn a_wrong_patch_is_mended_in_the_window() {
 
     let display = Display::start(folder);
     let log = || fs::read_to_string(folder.join("log")).unwrap();
-    let mut editor = Killed(
-        Command::new(env!("CARGO_BIN_EXE_normend"))
-            .arg("before.ply")
-            .current_dir(folder)
-            .env("DISPLAY", &display.name)
-            .env_remove("WAYLAND_DISPLAY")
-            .env_remove("WAYLAND_SOCKET")
-            .env("NORMEND_CONFIG_DIR", folder.join("config"))
-            .env("XDG_RUNTIME_DIR", folder)
-            .env("RUST_LOG", "normend_app=debug")
-            .stdin(Stdio::null())
-            .stderr(fs::File::create(folder.join("log")).unwrap())
-            .spawn()
-            .unwrap(),
-    );
+    let mut editor = Killed(editor(folder, &display).arg("before.ply").spawn().unwrap());
     // Where the pointer highlights nothing.
     let aside = (4, display.shot().height - 4);
     display.move_pointer(aside);
