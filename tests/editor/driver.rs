@@ -50,6 +50,16 @@ pub fn start_prepared(
     }
     let folder = tempfile::tempdir().unwrap();
     let scan = scan(folder.path());
+    Some(start_in(folder, pixels_per_point, prepare, scan))
+}
+
+/// The editor with its settings in this folder.
+fn start_in(
+    folder: tempfile::TempDir,
+    pixels_per_point: f32,
+    prepare: impl FnOnce(&mut Settings),
+    scan: Option<PathBuf>,
+) -> Editor {
     let (mut settings, problem) = SettingsStore::load_from(&folder.path().join("settings"));
     settings.settings.reduce_motion = true;
     // The first hints lie over the view.
@@ -61,10 +71,25 @@ pub fn start_prepared(
         .with_pixels_per_point(pixels_per_point)
         .wgpu_setup(WgpuSetup::CreateNew(graphics_setup()))
         .build_eframe(move |cc| App::with_settings(cc, scan, settings, problem));
-    Some(Editor { harness, folder })
+    Editor { harness, folder }
 }
 
 impl Editor {
+    /// Ends the editor as a crash does, nothing is asked and nothing closed, and starts it again with the same settings.
+    pub fn crash_and_start(self, scan: &Path) -> Self {
+        drop(self.harness);
+        start_in(self.folder, 1.0, |_| {}, Some(scan.to_path_buf()))
+    }
+
+    /// Where the editor keeps its journals.
+    pub fn journals(&self) -> Vec<PathBuf> {
+        let folder = self.folder.path().join("settings/state/journals");
+        let entries = fs::read_dir(folder).into_iter().flatten();
+        let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+        paths.sort();
+        paths
+    }
+
     pub fn app(&self) -> &App {
         self.harness.state()
     }

@@ -1,6 +1,7 @@
 //! What can be typed: the one table of commands and flags, which gives the parser and the help.
 
 pub mod bench;
+pub mod replay;
 pub mod suspects;
 
 use std::fmt;
@@ -18,6 +19,7 @@ use normend_io::{ReadError, Scan};
 use normend_render::{DisplayMode, StandardView};
 
 use self::bench::BenchArguments;
+use self::replay::{RehearseArguments, ReplayArguments};
 use self::suspects::SuspectsArguments;
 use crate::commands::render::{PaletteName, PictureSize};
 
@@ -102,6 +104,11 @@ pub enum Command {
     Render(RenderArguments),
     /// Write a generated scan whose normals are known
     Generate(GenerateArguments),
+    /// Do again what was decided in the editor, and write the scan as its export does
+    Replay(ReplayArguments),
+    /// Do a recipe's events one after another, with a journal
+    #[command(hide = true)]
+    Rehearse(RehearseArguments),
     /// Measure the methods on clouds whose normals are known
     Bench(BenchArguments),
 }
@@ -115,6 +122,8 @@ impl Command {
             Self::Suspects(_) => "suspects",
             Self::Render(_) => "render",
             Self::Generate(_) => "generate",
+            Self::Replay(_) => "replay",
+            Self::Rehearse(_) => "rehearse",
             Self::Bench(_) => "bench",
         }
     }
@@ -135,9 +144,9 @@ pub struct CommonArguments {
 /// How signs are found: a preset, and what is typed in place of its parameters.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct PropagationArguments {
-    /// A whole method; the flags below replace parts of it. Those of normals, graph and sources turn auto to tree
-    #[arg(long, value_name = "NAME", value_parser = one_of(&Preset::ALL, Preset::name), default_value = Preset::default().name())]
-    pub preset: Preset,
+    /// A whole method; the flags below replace parts of it. Those of normals, graph and sources turn auto to tree [default: auto]
+    #[arg(long, value_name = "NAME", value_parser = one_of(&Preset::ALL, Preset::name))]
+    pub preset: Option<Preset>,
 
     /// How normals are fitted to neighborhoods
     #[arg(long, value_name = "NAME", value_parser = one_of(&Estimator::ALL, Estimator::name))]
@@ -231,30 +240,35 @@ impl PropagationArguments {
             || self.views.is_some()
             || self.eta.is_some()
     }
+
+    /// `base` with what was typed in its place.
+    pub fn over(self, base: Parameters) -> Parameters {
+        let base = self.preset.map_or(base, Preset::parameters);
+        Parameters {
+            method: if self.sets_tree() {
+                Method::SpanningTree
+            } else {
+                base.method
+            },
+            estimator: self.estimator.unwrap_or(base.estimator),
+            k_normals: self
+                .k_normals
+                .or(self.estimator.map(Estimator::usual_k))
+                .unwrap_or(base.k_normals),
+            k_graph: self.k_graph.unwrap_or(base.k_graph),
+            edge_rule: self.edge_rule.unwrap_or(base.edge_rule),
+            start: self.start.unwrap_or(base.start),
+            sources: self.sources.unwrap_or(base.sources),
+            views: self.views.unwrap_or(base.views),
+            eta: self.eta.unwrap_or(base.eta),
+            rule: self.rule.unwrap_or(base.rule),
+        }
+    }
 }
 
 impl From<PropagationArguments> for Parameters {
     fn from(typed: PropagationArguments) -> Self {
-        let preset = typed.preset.parameters();
-        Self {
-            method: if typed.sets_tree() {
-                Method::SpanningTree
-            } else {
-                preset.method
-            },
-            estimator: typed.estimator.unwrap_or(preset.estimator),
-            k_normals: typed
-                .k_normals
-                .or(typed.estimator.map(Estimator::usual_k))
-                .unwrap_or(preset.k_normals),
-            k_graph: typed.k_graph.unwrap_or(preset.k_graph),
-            edge_rule: typed.edge_rule.unwrap_or(preset.edge_rule),
-            start: typed.start.unwrap_or(preset.start),
-            sources: typed.sources.unwrap_or(preset.sources),
-            views: typed.views.unwrap_or(preset.views),
-            eta: typed.eta.unwrap_or(preset.eta),
-            rule: typed.rule.unwrap_or(preset.rule),
-        }
+        typed.over(Self::default())
     }
 }
 

@@ -18,7 +18,7 @@ use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
 use arguments::{Arguments, Command};
-use commands::{Outcome, WrongUse, bench, check, generate, orient, render, suspects, wrong_use};
+use commands::{Outcome, WrongUse, bench, check, generate, orient, render, replay, suspects, wrong_use};
 
 /// The exit code of a program that was interrupted, by the shells' convention: 128 + SIGINT.
 const INTERRUPTED: u8 = 130;
@@ -45,7 +45,7 @@ fn run(arguments: Arguments) -> anyhow::Result<Outcome> {
                     scan.display()
                 )));
             }
-            normend_app::run(arguments.scan)?;
+            normend_app::run(arguments.scan, arguments.restore)?;
             Ok(Outcome::Done)
         }
         Some(Command::Orient(arguments)) => orient::run(arguments),
@@ -53,6 +53,8 @@ fn run(arguments: Arguments) -> anyhow::Result<Outcome> {
         Some(Command::Suspects(arguments)) => suspects::run(&arguments),
         Some(Command::Render(arguments)) => render::run(&arguments),
         Some(Command::Generate(arguments)) => generate::run(&arguments),
+        Some(Command::Replay(arguments)) => replay::run(&arguments),
+        Some(Command::Rehearse(arguments)) => replay::rehearse(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
     }
 }

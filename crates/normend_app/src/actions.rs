@@ -1,26 +1,29 @@
 //! What the editor does when it is asked, and what it does with the results of jobs and dialogs.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use normend_core::{Document, Edit, Start};
-use normend_render::DisplayMode;
 
 use crate::app::{App, Leaving};
 use crate::command::{Action, Command};
+use crate::compare::Style;
 use crate::crash;
 use crate::dialogs::{DialogAnswer, DialogPurpose};
 use crate::job::JobError;
 use crate::panels::export::ExportWindow;
 use crate::panels::modal::Modal;
-use crate::panels::open_path::OpenPathWindow;
+use crate::panels::open_path::{OpenPathWindow, What};
 use crate::panels::palette::PaletteWindow;
 use crate::panels::preferences::next_scale;
 use crate::panels::status_bar;
 use crate::scene_sync::Scene;
 use crate::session::Session;
 use crate::settings::{Purpose, SPLAT_SCALES};
+use crate::suspects_list::SuspectAction;
 use crate::theme;
-use crate::work::{ScanOrigin, Uploaded, Work};
+use crate::tools::point_tool::Means;
+use crate::work::{Opened, ScanOrigin, Uploaded, Work};
 
 const ZOOM_STEP: f32 = 1.25;
 /// Pointer motion that one press of an arrow key stands for, in points.
@@ -33,6 +36,7 @@ impl App {
     /// Does what was asked for.
     pub fn act(&mut self, action: Action) {
         match action {
+            Action::Run(command) if self.take_for_what_is_under_way(command) => {}
             Action::Run(command) => match self.availability(command) {
                 Ok(()) => self.run(command),
                 // A key that does nothing now says why.
@@ -41,13 +45,19 @@ impl App {
                     self.messages.note(format!("{name}: {reason}."));
                 }
             },
+            Action::OpenRecipe(path) => self.open_recipe(&path),
             Action::OpenScan(path) => self.leave(Leaving::Open(ScanOrigin::File(path))),
-            Action::Display(mode) => self.mode = mode,
+            Action::Display(coloring) => self.set_coloring(coloring),
+            Action::SelectValues { range, modifiers } => self.select_values(range, modifiers),
+            Action::Compare(style) => self.toggle_compare(style),
+            Action::OpenReference(path) => self.open_reference(&path),
+            Action::ShowWrong(index) => self.show_wrong(index),
             Action::ClearRecent => self.settings.settings.recent.clear(),
             Action::Propagate(parameters) => {
                 if let Some(session) = &mut self.session {
                     session.draft = parameters;
                     session.requested = parameters;
+                    session.requested_viewpoints = Arc::clone(&session.document.state().viewpoints);
                     let uploader = self.scene.as_ref().map(Scene::uploader);
                     let work = Work::propagate(&self.ctx, &session.document, parameters, true, uploader);
                     self.work = Some(work);
@@ -62,8 +72,21 @@ impl App {
                     self.viewport.fly_to(position, cloud.diagonal() * 0.25, None);
                 }
             }
+            Action::Point { pixel, means } => self.click_at(pixel, means),
+            Action::Pivot(pixel) => self.pivot_at(pixel),
             Action::FlipSources(points) => self.apply_edit(Edit::FlipSources(points)),
             Action::RemoveSources(points) => self.apply_edit(Edit::RemoveSources(points)),
+            Action::ProposeParameters(parameters) => self.propagate_if_possible(Action::Propagate(parameters)),
+            Action::ShowKind(kind, shown) => {
+                if let Some(session) = &mut self.session {
+                    session.kinds.show(kind, shown);
+                }
+                self.show_sources();
+            }
+            Action::DropKind(kind) => self.drop_kind(kind),
+            Action::Viewpoints(action) => self.act_on_viewpoints(action),
+            Action::Components(action) => self.act_on_components(action),
+            Action::Suspects(action) => self.review(action),
             Action::CancelJob => {
                 if let Some(work) = &self.work {
                     work.cancel();
@@ -87,12 +110,21 @@ impl App {
         }
     }
 
-    fn run(&mut self, command: Command) {
+    pub(crate) fn run(&mut self, command: Command) {
         match command {
             Command::Open => self
                 .dialogs
                 .pick_scan(&self.ctx, self.settings.settings.folder(Purpose::Open)),
-            Command::OpenPath => self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(None))),
+            Command::OpenPath => {
+                self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(What::Scan, None)));
+            }
+            Command::OpenRecipe => self
+                .dialogs
+                .pick_recipe(&self.ctx, self.settings.settings.folder(Purpose::Recipe)),
+            Command::OpenRecipePath => {
+                self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(What::Recipe, None)));
+            }
+            Command::SaveRecipe => self.ask_recipe_target(),
             Command::OpenSample => self.leave(Leaving::Open(ScanOrigin::Sample)),
             Command::Export => {
                 if let Some(session) = &self.session {
@@ -104,18 +136,54 @@ impl App {
             Command::Quit => self.ctx.send_viewport_cmd(egui::ViewportCommand::Close),
             Command::Undo => self.step_history(Session::undo),
             Command::Redo => self.step_history(Session::redo),
-            Command::MendHere => self.click_here(egui::Modifiers::NONE),
-            Command::MendAlongTreeHere => self.click_here(egui::Modifiers::ALT),
-            Command::LargerPatch => self.mend.step(1),
-            Command::SmallerPatch => self.mend.step(-1),
-            Command::TurnWholeHere => self.click_here(egui::Modifiers::COMMAND),
-            Command::SetPivot => {
-                let pixel = self.meant_pixel();
-                if let (Some(scene), Some(session)) = (&self.scene, &self.session) {
-                    let event = self.mend.pivot(scene, &session.document, pixel);
-                    self.handle(event);
+            Command::MendHere => match self.suspect_in_focus() {
+                Some(index) => self.review(SuspectAction::Flip(index)),
+                None => self.click_at(self.meant_pixel(), Means::Patch),
+            },
+            Command::NextSuspect => self.review(SuspectAction::Next),
+            Command::PreviousSuspect => self.review(SuspectAction::Previous),
+            Command::FindSuspects => self.review(SuspectAction::Look),
+            Command::FlipSuspect | Command::AcceptSuspect => {
+                if let Some(index) = self.suspect_in_focus() {
+                    self.review(match command {
+                        Command::FlipSuspect => SuspectAction::Flip(index),
+                        _ => SuspectAction::Accept(index),
+                    });
                 }
             }
+            Command::MendAlongTreeHere => self.click_at(self.meant_pixel(), Means::Tree),
+            Command::LargerPatch => self.point_tool.step(1),
+            Command::SmallerPatch => self.point_tool.step(-1),
+            Command::TurnWholeHere => self.click_at(self.meant_pixel(), Means::Whole),
+            Command::SelectPatchHere => self.click_at(self.meant_pixel(), Means::SelectPatch),
+            Command::SelectComponentHere => self.click_at(self.meant_pixel(), Means::SelectComponent),
+            Command::BrushTool
+            | Command::LassoTool
+            | Command::RectangleTool
+            | Command::PolygonTool
+            | Command::PatchTool
+            | Command::ComponentTool
+            | Command::MendTool
+            | Command::VisibleOnly
+            | Command::SelectAll
+            | Command::SelectNone
+            | Command::InvertSelection
+            | Command::GrowSelection
+            | Command::ShrinkSelection
+            | Command::SelectBacks
+            | Command::SelectPinned
+            | Command::SelectUndecided
+            | Command::HideSelected
+            | Command::Isolate
+            | Command::ShowAll
+            | Command::Flip
+            | Command::SelectionFacesMe
+            | Command::WhatISeeFacesMe
+            | Command::Pin
+            | Command::Unpin
+            | Command::PropagateFrom
+            | Command::PropagateInside => self.run_for_points(command),
+            Command::SetPivot => self.pivot_at(self.meant_pixel()),
             Command::SelectAllSources => {
                 if let Some(session) = &mut self.session {
                     session.selected = session.document.sources().iter().map(|source| source.point).collect();
@@ -164,11 +232,23 @@ impl App {
             Command::CutLess => self.viewport.cut_deeper(-1.0),
             Command::LargerSplats => self.scale_splats(SPLAT_STEP),
             Command::SmallerSplats => self.scale_splats(1.0 / SPLAT_STEP),
-            Command::NextDisplayMode => {
-                let all = DisplayMode::ALL;
-                let at = all.iter().position(|&mode| mode == self.mode).unwrap_or_default();
-                self.mode = all[(at + 1) % all.len()];
+            Command::NextDisplayMode => self.next_coloring(true),
+            Command::PreviousDisplayMode => self.next_coloring(false),
+            Command::ToggleHair => self.settings.settings.display.hair ^= true,
+            Command::ToggleSpheres => self.settings.settings.display.spheres ^= true,
+            Command::Section => self.viewport.toggle_section(),
+            Command::CompareSplit => self.toggle_compare(Style::Split),
+            Command::CompareBlink => self.toggle_compare(Style::Blink),
+            Command::OpenReference => self
+                .dialogs
+                .pick_reference(&self.ctx, self.settings.settings.folder(Purpose::Reference)),
+            Command::OpenReferencePath => {
+                self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(What::Reference, None)));
             }
+            Command::Screenshot => self.ask_picture(false),
+            Command::Turntable => self.ask_picture(true),
+            Command::NextWrong => self.next_wrong(true),
+            Command::PreviousWrong => self.next_wrong(false),
             Command::LargerInterface => self.scale_interface(true),
             Command::SmallerInterface => self.scale_interface(false),
             Command::UsualInterface => self.settings.settings.ui_scale = 1.0,
@@ -187,24 +267,17 @@ impl App {
         }
     }
 
-    fn click_here(&mut self, modifiers: egui::Modifiers) {
-        let pixel = self.meant_pixel();
-        if let (Some(scene), Some(session)) = (&self.scene, &self.session) {
-            let event = self.mend.click(scene, &session.document, pixel, modifiers);
-            self.handle(event);
-        }
-    }
-
-    /// Shows what is selected, or else the whole scan.
+    /// Shows the selected points, or else the selected sources, or else the whole scan.
     fn frame(&mut self) {
         let Some(session) = &self.session else { return };
-        let cloud = session.document.cloud();
-        if session.selected.is_empty() {
-            self.viewport.frame_all(cloud);
+        let (cloud, points) = (session.document.cloud(), session.document.selected());
+        let place = |point: u32| cloud.positions()[point as usize];
+        if !points.is_empty() {
+            self.viewport.frame_some(points.len(), points.iter().map(place));
+        } else if !session.selected.is_empty() {
+            self.viewport.frame_points(session.selected.iter().copied().map(place));
         } else {
-            let points = session.selected.iter();
-            self.viewport
-                .frame_points(points.map(|&point| cloud.positions()[point as usize]));
+            self.viewport.frame_all(cloud);
         }
     }
 
@@ -222,16 +295,20 @@ impl App {
     fn cancel(&mut self) {
         let windows = &mut self.windows;
         if let Some(modal) = windows.modal.take() {
-            if matches!(modal, Modal::Export(_)) {
-                self.after_export = None;
+            match modal {
+                Modal::Export(_) => self.after_export = None,
+                Modal::Restore => self.decide_later(),
+                _ => {}
             }
         } else if windows.close() {
         } else if self.viewport.cancel() {
             // It was something in the view.
+        } else if self.suspect_in_focus().is_some() {
+            self.review(SuspectAction::Leave);
         } else if let Some(work) = &self.work {
             work.cancel();
         } else {
-            self.deselect();
+            self.deselect_first();
         }
     }
 
@@ -268,14 +345,23 @@ impl App {
     }
 
     pub(crate) fn apply_edit(&mut self, edit: Edit) {
-        let Some(session) = &mut self.session else { return };
+        self.apply_edit_or_say(edit);
+    }
+
+    /// Applies an edit and shows it; returns what turned, or says why it cannot be made.
+    pub(crate) fn apply_edit_or_say(&mut self, edit: Edit) -> Option<normend_core::Change> {
+        let session = self.session.as_mut()?;
         match session.apply(edit) {
             Ok(change) => {
                 if let Some(scene) = &mut self.scene {
                     scene.apply(&change, session);
                 }
+                Some(change)
             }
-            Err(error) => self.messages.error(format!("This edit was not applied: {error}.")),
+            Err(error) => {
+                self.refuse(&error);
+                None
+            }
         }
     }
 
@@ -305,11 +391,18 @@ impl App {
     pub(crate) fn keep_oriented(&mut self) {
         let Some(session) = &mut self.session else { return };
         let wanted = session.document.parameters();
-        let Some(in_force) = session.document.propagation().map(|propagation| propagation.parameters) else {
+        let Some(propagation) = session.document.propagation() else {
             return;
         };
+        let in_force = propagation.parameters;
+        // Viewpoints matter where they vote.
+        let places = &session.document.state().viewpoints;
+        let are_old = propagation.votes.is_some() && *places != propagation.viewpoints;
+        let are_new = *places != session.requested_viewpoints;
         match &self.work {
             None if wanted != in_force && wanted != session.requested => {}
+            None if are_old && are_new => {}
+            Some(Work::Propagate { is_asked: false, .. }) if are_new => {}
             // The running one is for parameters that were taken back meanwhile.
             Some(Work::Propagate {
                 parameters,
@@ -319,8 +412,9 @@ impl App {
             _ => return,
         }
         (session.draft, session.requested) = (wanted, wanted);
+        session.requested_viewpoints = Arc::clone(places);
         self.work = None;
-        if wanted != in_force {
+        if wanted != in_force || are_old {
             let uploader = self.scene.as_ref().map(Scene::uploader);
             let work = Work::propagate(&self.ctx, &session.document, wanted, false, uploader);
             self.work = Some(work);
@@ -355,7 +449,7 @@ impl App {
         }
         // A job that runs is dropped here, so its result cannot arrive.
         let uploader = self.scene.as_ref().map(Scene::uploader);
-        self.work = Some(Work::open(&self.ctx, origin, uploader));
+        self.work = Some(Work::open(&self.ctx, origin, self.journal_folder(), uploader));
     }
 
     pub(crate) fn take_dialogs(&mut self) {
@@ -368,14 +462,41 @@ impl App {
                 }
                 (DialogPurpose::Open, DialogAnswer::Picked(path)) => self.act(Action::OpenScan(path)),
                 (DialogPurpose::Open, DialogAnswer::Unavailable) => {
-                    self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(Some(note.to_owned()))));
+                    self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(What::Scan, Some(note.to_owned()))));
+                }
+                (DialogPurpose::OpenRecipe, _) if self.windows.modal.is_some() => {
+                    self.messages
+                        .note("No recipe was opened: answer the open window first.");
+                }
+                (DialogPurpose::OpenRecipe, DialogAnswer::Picked(path)) => self.act(Action::OpenRecipe(path)),
+                (DialogPurpose::OpenRecipe, DialogAnswer::Unavailable) => {
+                    self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(
+                        What::Recipe,
+                        Some(note.to_owned()),
+                    )));
+                }
+                (DialogPurpose::OpenReference, _) if self.windows.modal.is_some() => {
+                    self.messages
+                        .note("No reference was opened: answer the open window first.");
+                }
+                (DialogPurpose::OpenReference, DialogAnswer::Picked(path)) => self.act(Action::OpenReference(path)),
+                (DialogPurpose::OpenReference, DialogAnswer::Unavailable) => {
+                    let window = OpenPathWindow::new(What::Reference, Some(note.to_owned()));
+                    self.windows.modal = Some(Modal::OpenPath(window));
+                }
+                (DialogPurpose::SaveRecipe, DialogAnswer::Picked(path)) => {
+                    if let Some(Modal::SaveRecipe { window, .. }) = &mut self.windows.modal {
+                        window.set_path(&path);
+                    }
                 }
                 (DialogPurpose::Export, DialogAnswer::Picked(path)) => {
                     if let Some(Modal::Export(window)) = &mut self.windows.modal {
                         window.set_path(&path);
                     }
                 }
-                (DialogPurpose::Export, DialogAnswer::Unavailable) => self.messages.note(note),
+                (DialogPurpose::Export | DialogPurpose::SaveRecipe, DialogAnswer::Unavailable) => {
+                    self.messages.note(note)
+                }
             }
         }
     }
@@ -412,6 +533,10 @@ impl App {
                         session.requested = propagation.parameters;
                     }
                 }
+            },
+            Some(Work::Pictures { job, target }) => match job.poll() {
+                None => self.work = Some(Work::Pictures { job, target }),
+                Some(outcome) => self.take_pictures(outcome, &target),
             },
             Some(Work::Export { job, path, revision }) => match job.poll() {
                 None => {
@@ -459,16 +584,27 @@ impl App {
         }
     }
 
-    fn show_scan(&mut self, scan: Uploaded<normend_io::Scan>, origin: &ScanOrigin) {
+    fn show_scan(&mut self, opened: Uploaded<Opened>, origin: &ScanOrigin) {
         if let ScanOrigin::File(path) = origin {
             self.settings.settings.remember_scan(path);
         }
-        let session = Session::new(scan.result, origin.name());
+        let Opened { scan, mut findings } = opened.result;
+        let session = Session::new(scan, origin.name());
+        self.recipe_job = None;
+        if let Some(before) = self.session.take() {
+            let is_again = before.identity().is_same_content(&session.identity());
+            before.finish();
+            if is_again {
+                findings = self.find_again(&session);
+            }
+        }
         self.viewport.look_at(session.document.cloud());
+        self.display.show_scan(&session.scan);
+        self.comparing.show_scan();
         self.clicked_revision = None;
+        self.forget_what_is_under_way();
         if let Some(scene) = &mut self.scene {
-            self.mend.reset(scene);
-            if let Err(error) = scene.show_points(session.document.cloud(), scan.cloud) {
+            if let Err(error) = scene.show_points(session.document.cloud(), opened.cloud) {
                 self.messages
                     .error(format!("The scan is open but cannot be shown: {error}."));
             }
@@ -483,6 +619,7 @@ impl App {
         crash::set_scan(session.scan.path().map(std::path::PathBuf::as_path));
         self.session = Some(session);
         self.act(Action::Propagate(parameters));
+        self.take_findings(findings);
     }
 
     /// Shows the open scan as another propagation of it orients it, just as a finished job does.
@@ -494,6 +631,7 @@ impl App {
     }
 
     fn install(&mut self, propagation: Uploaded<normend_core::Propagation>) {
+        self.forget_what_is_under_way();
         let Some(session) = &mut self.session else { return };
         let Uploaded {
             result: propagation,
@@ -503,10 +641,11 @@ impl App {
         let is_from_one_place = propagation.found_station.is_some();
         session.install(propagation);
         if let Some(scene) = &mut self.scene {
-            self.mend.reset(scene);
             if crash::is_loss_asked_for() {
                 scene.lose_device();
             }
+            self.display.points_changed();
+            self.comparing.points_changed();
             if let Err(error) = scene.show_document(session, cloud) {
                 self.messages
                     .error(format!("The scan is oriented but cannot be shown: {error}."));

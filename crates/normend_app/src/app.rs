@@ -4,24 +4,35 @@ use std::path::PathBuf;
 use std::sync::mpsc;
 
 use egui::{CentralPanel, Panel, ScrollArea, Ui};
-use normend_core::{Document, Edit};
-use normend_render::{DisplayMode, DrawSettings, SplatRenderer};
+use normend_core::Document;
+use normend_render::{DrawSettings, SplatRenderer};
 
 use crate::command::{Action, Command, Keymap, take_shortcuts};
+use crate::compare::Comparing;
 use crate::crash;
-use crate::dialogs::Dialogs;
+use crate::dialogs::{self, Dialogs};
 use crate::messages::Messages;
+use crate::paint::Display;
 use crate::panels::modal::Modal;
+use crate::panels::proposal::Reply;
 use crate::panels::side::SideTab;
-use crate::panels::{empty, hints, history, menu_bar, messages, orient, progress, side, sources, status_bar, view};
+use crate::panels::{
+    empty, hints, history, menu_bar, messages, orient, progress, proposal, side, sources, status_bar, suspects,
+    tool_bar, view,
+};
 use crate::popup_keys;
+use crate::recipes::RecipeJob;
 use crate::run;
-use crate::scene_sync::{Scene, Target};
+use crate::scene_sync::Scene;
+use crate::selection::Selecting;
 use crate::session::Session;
 use crate::settings::{SettingsStore, WindowPlace};
+use crate::suspect_pictures::SuspectPictures;
 use crate::theme;
-use crate::tools::mend::MendTool;
-use crate::tools::{Tool, ToolEvent};
+use crate::tools::Tool;
+use crate::tools::painting::Painting;
+use crate::tools::point_tool::PointTool;
+use crate::verbs::Proposal;
 use crate::viewport::{Pixel, Viewport};
 use crate::windows::Windows;
 use crate::work::{ScanOrigin, Work};
@@ -44,21 +55,39 @@ pub struct App {
     pub(crate) session: Option<Session>,
     pub(crate) viewport: Viewport,
     pub(crate) tool: Tool,
-    pub(crate) mend: MendTool,
-    pub(crate) mode: DisplayMode,
+    pub(crate) point_tool: PointTool,
+    pub(crate) painting: Painting,
+    pub(crate) selecting: Selecting,
+    /// Tools that draw select only what is seen; else also what is behind.
+    pub(crate) visible_only: bool,
+    /// In points.
+    pub(crate) brush_radius: f32,
+    pub(crate) proposal: Option<Proposal>,
+    /// The pixel that the open menu of the view is about.
+    pub(crate) menu_pixel: Option<Pixel>,
+    pub(crate) display: Display,
+    pub(crate) comparing: Comparing,
     pub(crate) work: Option<Work>,
     pub(crate) dialogs: Dialogs,
     pub(crate) windows: Windows,
     pub(crate) messages: Messages,
     /// What to do once the running export is written.
     pub(crate) after_export: Option<Leaving>,
+    /// The recipe that is being read or written.
+    pub(crate) recipe_job: Option<RecipeJob>,
+    /// The next scan's newest journal is restored without asking.
+    pub(crate) restores_unasked: bool,
     /// The user has decided to close the editor.
     pub(crate) quitting: bool,
     /// The revision that the last click in the view made; the second click of a double-click takes it back.
     pub(crate) clicked_revision: Option<u64>,
-    hovered: Option<Pixel>,
+    pub(crate) suspect_pictures: SuspectPictures,
+    /// The user stepped to a suspect, forward or back, before the list was there.
+    pub(crate) steps_to_suspect: Option<bool>,
+    /// The suspect whose points are outlined in the view: which list, which row.
+    pub(crate) outlined_suspect: Option<(u64, usize)>,
+    pub(crate) hovered: Option<Pixel>,
     gpu_errors: mpsc::Receiver<String>,
-    can_drop: bool,
     title: String,
     window_place: WindowPlace,
 }
@@ -122,19 +151,29 @@ impl App {
             session: None,
             viewport: Viewport::new(),
             tool: Tool::default(),
-            mend: MendTool::default(),
-            mode: DisplayMode::default(),
+            point_tool: PointTool::default(),
+            painting: Painting::default(),
+            selecting: Selecting::default(),
+            visible_only: true,
+            brush_radius: 24.0,
+            proposal: None,
+            menu_pixel: None,
+            display: Display::default(),
+            comparing: Comparing::default(),
             work: None,
             dialogs: Dialogs::new(),
             windows: Windows::default(),
             messages,
             after_export: None,
+            recipe_job: None,
+            restores_unasked: false,
             quitting: false,
             clicked_revision: None,
+            suspect_pictures: SuspectPictures::default(),
+            steps_to_suspect: None,
+            outlined_suspect: None,
             hovered: None,
             gpu_errors,
-            // winit gives no dropped files on Wayland.
-            can_drop: std::env::var_os("WAYLAND_DISPLAY").is_none_or(|name| name.is_empty()),
             title: String::new(),
             window_place,
         };
@@ -161,12 +200,37 @@ impl App {
 
     /// How many points a click at the pointer would turn; `None` when it is not on the scan or not known yet.
     pub fn n_would_turn(&self) -> Option<u64> {
-        self.mend.n_would_turn()
+        self.point_tool.n_would_turn()
     }
 
     /// Which of the offered patches a click at the pointer would turn, the smallest is 1, and how many are offered.
     pub fn patch_level(&self) -> Option<(usize, usize)> {
-        self.mend.level()
+        self.point_tool.level()
+    }
+
+    /// What the pointer is for in the 3D view.
+    pub fn tool(&self) -> Tool {
+        self.tool
+    }
+
+    /// Whether the answer to a stroke or another wish for points is awaited.
+    pub fn is_selecting(&self) -> bool {
+        self.selecting.is_busy()
+    }
+
+    /// How many points the edit that is shown and waits for an answer would turn.
+    pub fn n_proposed(&self) -> Option<u64> {
+        self.proposal.as_ref().map(|proposal| proposal.n_points)
+    }
+
+    /// Clicks, strokes and verbs so far.
+    pub fn n_interactions(&self) -> u64 {
+        self.session.as_ref().map_or(0, |session| session.n_interactions)
+    }
+
+    /// Bytes uploaded to the graphics adapter so far.
+    pub fn bytes_uploaded(&self) -> u64 {
+        self.scene.as_ref().map_or(0, Scene::bytes_uploaded)
     }
 
     /// Where the 3D view is seen from.
@@ -179,11 +243,6 @@ impl App {
         &self.viewport.clip
     }
 
-    /// How the scan is colored.
-    pub fn display_mode(&self) -> DisplayMode {
-        self.mode
-    }
-
     /// The 3D view's place in the window, in points.
     pub fn view_rect(&self) -> egui::Rect {
         self.viewport.rect
@@ -194,16 +253,23 @@ impl App {
         self.scene.as_ref()?.read_picture()
     }
 
+    /// Reads back which point the 3D view's picture shows at each of its pixels: width, height, and rows from the top. Blocks.
+    pub fn seen_points(&self) -> Option<([u32; 2], Vec<Option<u32>>)> {
+        self.scene.as_ref()?.read_points()
+    }
+
     /// All messages of this run, oldest first.
     pub fn messages(&self) -> &Messages {
         &self.messages
     }
 
-    fn draw_settings(&self, dark: bool) -> DrawSettings {
+    pub(crate) fn draw_settings(&self, dark: bool) -> DrawSettings {
         DrawSettings {
-            mode: self.mode,
+            mode: self.display.coloring().mode(),
             palette: theme::palette(self.settings.settings.palette, dark),
             splat_scale: self.settings.settings.splat_scale,
+            spheres: self.settings.settings.display.spheres,
+            eye_dome: self.settings.settings.display.eye_dome,
             ..DrawSettings::default()
         }
     }
@@ -240,7 +306,14 @@ impl App {
                     .note(format!("{name} was not opened: answer the open window first."));
                 return;
             }
-            self.act(Action::OpenScan(path));
+            let is_recipe = path
+                .extension()
+                .is_some_and(|extension| extension == normend_io::recipe::EXTENSION);
+            self.act(if is_recipe {
+                Action::OpenRecipe(path)
+            } else {
+                Action::OpenScan(path)
+            });
         }
     }
 
@@ -283,7 +356,9 @@ impl App {
             let undo = document.and_then(Document::next_undo).map(|step| step.kind().label());
             let redo = document.and_then(Document::next_redo).map(|step| step.kind().label());
             let availability = |command| self.availability(command);
-            if let Some(chosen) = menu_bar::toolbar(ui, &availability, undo, redo) {
+            let tool = document.map(|_| self.tool);
+            let tools = |ui: &mut Ui| tool_bar::ui(ui, tool, self.visible_only);
+            if let Some(chosen) = menu_bar::toolbar(ui, &availability, undo, redo, tools) {
                 action = Some(chosen);
             }
         });
@@ -291,9 +366,10 @@ impl App {
             status_bar::ui(
                 ui,
                 self.session.as_ref(),
-                self.mend.n_would_turn(),
-                self.mend.level(),
+                self.point_tool.n_would_turn(),
+                self.point_tool.level(),
                 self.session.as_ref().map(|_| self.tool),
+                self.comparing.judged(),
                 &self.adapter,
             );
         });
@@ -306,7 +382,8 @@ impl App {
         let session = self.session.as_mut()?;
         let settings = &mut self.settings.settings;
         let palette = theme::palette(settings.palette, ui.visuals().dark_mode);
-        let mode = &mut self.mode;
+        let (display, comparing, viewport) = (&mut self.display, &mut self.comparing, &mut self.viewport);
+        let pictures = &mut self.suspect_pictures;
         let frame = egui::Frame::new()
             .fill(ui.visuals().panel_fill)
             .inner_margin(egui::Margin::symmetric(theme::SPACE_M as i8, theme::SPACE_M as i8));
@@ -323,14 +400,20 @@ impl App {
                         side::tabs(ui, &mut settings.side_tab);
                         match settings.side_tab {
                             SideTab::Orient => orient::ui(ui, session, propagating, blocked),
-                            SideTab::Sources => {
-                                let list = |ui: &mut Ui| sources::ui(ui, session);
-                                theme::section_about(ui, "Sources", sources::ABOUT, list)
+                            SideTab::Sources => sources::ui(ui, session, blocked),
+                            SideTab::Suspects => {
+                                let list = |ui: &mut Ui| suspects::ui(ui, session, pictures);
+                                theme::section_about(ui, "Suspects", suspects::ABOUT, list)
                             }
-                            SideTab::View => {
-                                view::ui(ui, settings, mode, &palette);
-                                None
+                            SideTab::View => view::ViewTab {
+                                document: &session.document,
+                                settings,
+                                display,
+                                viewport,
+                                comparing,
+                                palette,
                             }
+                            .ui(ui),
                             SideTab::History => history::ui(ui, session),
                         }
                     })
@@ -349,106 +432,18 @@ impl App {
                 let area = ui.available_rect_before_wrap();
                 let mut action = None;
                 if self.session.is_some() {
-                    self.view(ui, &mut draw_settings);
+                    action = self.view(ui, &mut draw_settings);
+                    if let Some(session) = &self.session {
+                        action = suspects::card(ui, area, &session.suspects).or(action);
+                    }
+                    action = self.viewpoint_marks(ui).or(action);
                 } else if self.work.is_none() {
-                    action = empty::ui(ui, &self.settings.settings.recent, self.can_drop);
+                    action = empty::ui(ui, &self.settings.settings.recent, dialogs::can_drop());
                 }
                 self.overlays(ui, area);
                 action
             })
             .inner
-    }
-
-    fn view(&mut self, ui: &mut Ui, draw_settings: &mut DrawSettings) {
-        let Some(scene) = &mut self.scene else {
-            ui.centered_and_justified(|ui| ui.label("There is no graphics adapter to show the scan."));
-            return;
-        };
-        let under_pointer = self.mend.target().map(|target| target.position());
-        let preferences = &self.settings.settings;
-        self.viewport
-            .set_preferences(preferences.navigation, preferences.reduce_motion);
-        let pointer = self.viewport.ui(ui, scene, draw_settings, under_pointer);
-        self.settings.settings.splat_scale = draw_settings.splat_scale.clamp(
-            *crate::settings::SPLAT_SCALES.start(),
-            *crate::settings::SPLAT_SCALES.end(),
-        );
-        self.mend.step(pointer.steps);
-        let document = self.session.as_ref().map(|session| &session.document);
-        let asked = match (document, pointer.clicked, pointer.pivot) {
-            (Some(document), _, Some(pixel)) => self.mend.pivot(scene, document, pixel),
-            (Some(document), Some(pixel), None) => self.mend.click(scene, document, pixel, pointer.modifiers),
-            (None, ..) | (Some(_), None, None) => None,
-        };
-        if pointer.by_double_click {
-            self.take_back_click();
-        }
-        self.handle(asked);
-        let (Some(scene), Some(session)) = (&mut self.scene, &self.session) else {
-            return;
-        };
-        let answered = self.mend.update(scene, session, &pointer);
-        self.handle(answered);
-        self.hovered = pointer.hovered;
-        if self.mend.is_picking() {
-            ui.request_repaint();
-        }
-        if let (Some(position), Some(text)) = (pointer.position, self.badge_text()) {
-            self.viewport.badge(ui, position, &text);
-        }
-    }
-
-    /// What a click at the pointer would do.
-    fn badge_text(&self) -> Option<String> {
-        if let Some(n_points) = self.mend.n_would_turn() {
-            return Some(format!("Turns {}", theme::counted(n_points, "point", "points")));
-        }
-        let session = self.session.as_ref()?;
-        let Some(Target::Source { point, .. }) = self.mend.target() else {
-            return None;
-        };
-        let source = session.document.sources().get(point)?;
-        let state = if session.document.is_flipped(source) {
-            "flipped"
-        } else {
-            "kept"
-        };
-        Some(format!(
-            "Source at point {}, {state}",
-            theme::thousands(u64::from(point))
-        ))
-    }
-
-    /// The first click of a double-click mended something; the user meant the pivot.
-    fn take_back_click(&mut self) {
-        let revision = self.document().map(Document::revision);
-        if self
-            .clicked_revision
-            .take()
-            .is_some_and(|clicked| Some(clicked) == revision)
-        {
-            self.act(Command::Undo.into());
-        }
-    }
-
-    pub(crate) fn handle(&mut self, event: Option<ToolEvent>) {
-        match event {
-            None => {}
-            Some(ToolEvent::Edit(edit)) => self.apply_click(edit),
-            Some(ToolEvent::SelectSource { point, extend }) => self.act(Action::SelectSource { point, extend }),
-            Some(ToolEvent::Deselect) => self.deselect(),
-            Some(ToolEvent::Pivot(point)) => self.viewport.set_pivot(point),
-        }
-    }
-
-    fn apply_click(&mut self, edit: Edit) {
-        self.apply_edit(edit);
-        self.clicked_revision = self.document().map(Document::revision);
-    }
-
-    /// The pixel that keyboard commands mean: under the pointer, else the middle of the view.
-    pub(crate) fn meant_pixel(&self) -> Pixel {
-        self.hovered.unwrap_or_else(|| self.viewport.center())
     }
 
     fn overlays(&mut self, ui: &Ui, area: egui::Rect) {
@@ -461,6 +456,12 @@ impl App {
             messages::toasts(ui, area, &mut self.messages);
         }
         self.show_hint(ui, area);
+        if let Some(reply) = self.n_proposed().and_then(|n_points| proposal::ui(ui, area, n_points)) {
+            match reply {
+                Reply::Apply => self.accept_proposal(),
+                Reply::Leave => drop(self.drop_proposal()),
+            }
+        }
         if ui.input(|input| !input.raw.hovered_files.is_empty()) {
             let painter = ui
                 .ctx()
@@ -552,7 +553,11 @@ impl eframe::App for App {
         self.take_gpu_errors();
         self.take_dialogs();
         self.take_work();
+        self.keep_journal();
         self.keep_oriented();
+        self.keep_shown();
+        self.keep_components();
+        self.keep_suspects();
         self.take_drops();
         self.take_keys();
         self.answer_close_request();
@@ -575,5 +580,8 @@ impl eframe::App for App {
 
     fn on_exit(&mut self) {
         self.save_settings();
+        if let Some(session) = self.session.take() {
+            session.finish();
+        }
     }
 }

@@ -21,6 +21,11 @@ impl App {
                 check(self.work.is_none(), "wait for the running work, or cancel it")?;
                 check(is_oriented, "the scan is not oriented yet")
             }
+            Command::OpenRecipe | Command::OpenRecipePath | Command::SaveRecipe => {
+                check(document.is_some(), "no scan is open")?;
+                check(!exporting, "an export is being written")?;
+                check(self.recipe_job.is_none(), "another recipe is being read or written")
+            }
             Command::Propagate => {
                 check(document.is_some(), "no scan is open")?;
                 check(!exporting, "an export is being written")?;
@@ -40,6 +45,13 @@ impl App {
             Command::MendHere | Command::MendAlongTreeHere | Command::TurnWholeHere => {
                 check(is_oriented, "the scan is not oriented yet")
             }
+            Command::NextSuspect | Command::PreviousSuspect | Command::FindSuspects => {
+                check(is_oriented, "the scan is not oriented yet")
+            }
+            Command::FlipSuspect | Command::AcceptSuspect => check(
+                self.suspect_in_focus().is_some(),
+                "no suspect is shown; step to one first",
+            ),
             Command::LargerPatch | Command::SmallerPatch => {
                 check(is_oriented, "the scan is not oriented yet")?;
                 let propagation = document.and_then(Document::propagation);
@@ -80,7 +92,51 @@ impl App {
             | Command::CutLess
             | Command::LargerSplats
             | Command::SmallerSplats
-            | Command::NextDisplayMode => check(document.is_some(), "no scan is open"),
+            | Command::NextDisplayMode
+            | Command::PreviousDisplayMode
+            | Command::ToggleHair
+            | Command::ToggleSpheres
+            | Command::Section => check(document.is_some(), "no scan is open"),
+            Command::CompareSplit | Command::CompareBlink | Command::OpenReference | Command::OpenReferencePath => {
+                check(is_oriented, "the scan is not oriented yet")
+            }
+            Command::Screenshot | Command::Turntable => {
+                check(document.is_some(), "no scan is open")?;
+                check(self.scene.is_some(), "there is no graphics adapter")?;
+                check(self.work.is_none(), "wait for the running work, or cancel it")
+            }
+            Command::NextWrong | Command::PreviousWrong => check(
+                self.comparing.reference().is_some(),
+                "open a reference first (File, Compare with reference)",
+            ),
+            Command::BrushTool
+            | Command::LassoTool
+            | Command::RectangleTool
+            | Command::PolygonTool
+            | Command::PatchTool
+            | Command::ComponentTool
+            | Command::MendTool
+            | Command::VisibleOnly
+            | Command::SelectAll
+            | Command::SelectNone
+            | Command::InvertSelection
+            | Command::GrowSelection
+            | Command::ShrinkSelection
+            | Command::SelectPatchHere
+            | Command::SelectComponentHere
+            | Command::SelectBacks
+            | Command::SelectPinned
+            | Command::SelectUndecided
+            | Command::HideSelected
+            | Command::Isolate
+            | Command::ShowAll
+            | Command::Flip
+            | Command::SelectionFacesMe
+            | Command::WhatISeeFacesMe
+            | Command::Pin
+            | Command::Unpin
+            | Command::PropagateFrom
+            | Command::PropagateInside => self.availability_for_points(command),
             Command::ShowHints => check(
                 !self.settings.settings.dismissed_hints.is_empty(),
                 "no hint was dismissed yet",

@@ -1,11 +1,24 @@
 //! The system's file dialogs, awaited beside the window.
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc;
+use std::sync::{LazyLock, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use normend_io::FileFormat;
+use normend_io::{FileFormat, recipe};
+
+/// What to say where files cannot be dropped on the window.
+pub const NO_DROP: &str = "On Wayland, files cannot be dropped on this window.";
+
+/// Whether files can be dropped on the window: winit 0.30 hands none on from Wayland.
+pub fn can_drop() -> bool {
+    static CAN_DROP: LazyLock<bool> = LazyLock::new(|| {
+        let is_set = |variable| std::env::var_os(variable).is_some_and(|name| !name.is_empty());
+        // winit takes Wayland wherever one of these is set.
+        !(is_set("WAYLAND_DISPLAY") || is_set("WAYLAND_SOCKET"))
+    });
+    *CAN_DROP
+}
 
 /// What a dialog is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,6 +27,12 @@ pub enum DialogPurpose {
     Open,
     /// The target of an export.
     Export,
+    /// A recipe for the open scan.
+    OpenRecipe,
+    /// Where a recipe is saved.
+    SaveRecipe,
+    /// A scan to compare with.
+    OpenReference,
 }
 
 /// What became of a dialog.
@@ -70,14 +89,56 @@ impl Dialogs {
 
     /// Asks for the target of an export, with `suggested` as the start. Does nothing while another dialog is open.
     pub fn pick_target(&mut self, ctx: &egui::Context, suggested: &Path) {
-        let mut dialog = rfd::AsyncFileDialog::new().set_title("Export");
+        let dialog = rfd::AsyncFileDialog::new().set_title("Export");
+        self.save(ctx, DialogPurpose::Export, dialog, suggested);
+    }
+
+    /// Asks for a recipe to open. Does nothing while another dialog is open.
+    pub fn pick_recipe(&mut self, ctx: &egui::Context, folder: Option<&Path>) {
+        let mut dialog = rfd::AsyncFileDialog::new()
+            .set_title("Open a recipe")
+            .add_filter("Recipes", &[recipe::EXTENSION])
+            .add_filter("All files", &["*"]);
+        if let Some(folder) = folder {
+            dialog = dialog.set_directory(folder);
+        }
+        self.show(ctx, DialogPurpose::OpenRecipe, || dialog.pick_file());
+    }
+
+    /// Asks for a scan to compare with. Does nothing while another dialog is open.
+    pub fn pick_reference(&mut self, ctx: &egui::Context, folder: Option<&Path>) {
+        let mut dialog = rfd::AsyncFileDialog::new().set_title("Compare with a reference");
+        for format in FileFormat::ALL {
+            dialog = dialog.add_filter(format.label(), format.extensions());
+        }
+        if let Some(folder) = folder {
+            dialog = dialog.set_directory(folder);
+        }
+        self.show(ctx, DialogPurpose::OpenReference, || dialog.pick_file());
+    }
+
+    /// Asks where a recipe is saved, with `suggested` as the start. Does nothing while another dialog is open.
+    pub fn pick_recipe_target(&mut self, ctx: &egui::Context, suggested: &Path) {
+        let dialog = rfd::AsyncFileDialog::new()
+            .set_title("Save recipe")
+            .add_filter("Recipes", &[recipe::EXTENSION]);
+        self.save(ctx, DialogPurpose::SaveRecipe, dialog, suggested);
+    }
+
+    fn save(
+        &mut self,
+        ctx: &egui::Context,
+        purpose: DialogPurpose,
+        mut dialog: rfd::AsyncFileDialog,
+        suggested: &Path,
+    ) {
         if let Some(folder) = suggested.parent().filter(|folder| folder.is_dir()) {
             dialog = dialog.set_directory(folder);
         }
         if let Some(name) = suggested.file_name() {
             dialog = dialog.set_file_name(name.to_string_lossy());
         }
-        self.show(ctx, DialogPurpose::Export, || dialog.save_file());
+        self.show(ctx, purpose, || dialog.save_file());
     }
 
     fn show<F>(&mut self, ctx: &egui::Context, purpose: DialogPurpose, start: impl FnOnce() -> F)

@@ -105,7 +105,10 @@ impl Journal {
     /// Goes on with a journal that was left behind, after its edits were restored. What of it is damaged is copied beside it.
     pub fn resume(offer: Offer) -> Self {
         let Offer {
-            reading, path, mut file, ..
+            reading,
+            path,
+            mut file,
+            ..
         } = offer;
         if let recipe::End::Damaged(_) = reading.end {
             // Whoever wants to look what it was; without room for it that is lost.
@@ -117,7 +120,11 @@ impl Journal {
         let read = file
             .seek(SeekFrom::Start(reading.n_bytes.saturating_sub(1)))
             .and_then(|_| file.read_exact(&mut last));
-        let pending = if read.is_ok() && last != *b"\n" { vec![b'\n'] } else { Vec::new() };
+        let pending = if read.is_ok() && last != *b"\n" {
+            vec![b'\n']
+        } else {
+            Vec::new()
+        };
         Self::start(Out {
             folder: path.parent().map(Path::to_path_buf).unwrap_or_default(),
             head: reading.recipe.head,
@@ -139,7 +146,9 @@ impl Journal {
             .name("normend journal".to_owned())
             .spawn(move || keep_synced(&shared, &asked));
         if let Err(error) = &thread {
-            lock(&out).news = Some(News::Failing(format!("the system gives no thread to sync them ({error})")));
+            lock(&out).news = Some(News::Failing(format!(
+                "the system gives no thread to sync them ({error})"
+            )));
         }
         Self {
             out,
@@ -174,6 +183,9 @@ impl Journal {
         let mut out = lock(&self.out);
         out.push(line);
         out.flush();
+        if out.failed.is_none() {
+            tracing::debug!("an edit is in the journal, {} bytes", out.n_bytes);
+        }
         drop(out);
         if let Some(sync) = &self.sync {
             // Without its thread the system syncs when it likes.
@@ -302,7 +314,11 @@ fn create(folder: &Path, stem: &str, bytes: &[u8]) -> io::Result<(File, PathBuf)
     fs::create_dir_all(folder)?;
     let mut temporary = beside(folder, bytes)?;
     for number in 1..=MOST_JOURNALS {
-        let number = if number == 1 { String::new() } else { format!("-{number}") };
+        let number = if number == 1 {
+            String::new()
+        } else {
+            format!("-{number}")
+        };
         let path = folder.join(format!("{stem}{number}.{EXTENSION}"));
         match temporary.persist_noclobber(&path) {
             Ok(file) => {

@@ -23,11 +23,12 @@ struct Seen {
     restarted: Option<Result<(), String>>,
 }
 
-/// Opens the editor's window, with `scan` when one is given, and runs until it is closed.
+/// Opens the editor's window, with `scan` when one is given, and runs until it is closed. Where `restores`, the scan's newest
+/// journal is restored without asking.
 ///
 /// # Errors
 /// In words for the user: no display, no graphics driver, and the package that gives it.
-pub fn run(scan: Option<PathBuf>) -> anyhow::Result<()> {
+pub fn run(scan: Option<PathBuf>, restores: bool) -> anyhow::Result<()> {
     let (mut settings, problem) = SettingsStore::load();
     let news = crash::news(&settings.settings.told_crash).map(|(name, path)| {
         settings.settings.told_crash = name;
@@ -44,7 +45,10 @@ pub fn run(scan: Option<PathBuf>) -> anyhow::Result<()> {
             "Normend",
             options,
             Box::new(move |cc| {
-                let mut app = App::with_settings(cc, scan, settings, problem);
+                let mut app = App::with_settings(cc, None, settings, problem);
+                if let Some(scan) = scan {
+                    app.open_at_start(scan, restores || crash::was_restarted());
+                }
                 app.say_what_happened(news);
                 Ok(Box::new(app))
             }),

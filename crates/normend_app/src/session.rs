@@ -1,12 +1,22 @@
 //! One open scan: the file, the document made of it, and what the user has chosen but not applied yet.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use normend_core::document::Step;
-use normend_core::{Change, Document, Edit, EditError, EditKind, Parameters, Propagation, SpanningTree, Start};
+use normend_core::{
+    Change, Document, Edit, EditError, EditKind, Parameters, PointSet, Propagation, SpanningTree, Start, StateChange,
+};
 use normend_io::Scan;
+use normend_io::recipe::{Head, Recipe, RecordedStep, ScanIdentity};
+
+use crate::components::Components;
+use crate::journal::Journal;
+use crate::journal::found::Offer;
+use crate::source_kinds::SourceKinds;
+use crate::suspects_list::SuspectsList;
+use crate::viewpoints::Viewpoints;
 
 /// An open scan.
 pub struct Session {
@@ -29,6 +39,33 @@ pub struct Session {
     /// Components whose right side nothing tells but a source of the user, ascending, as indices of the tree's roots.
     undecided: Vec<usize>,
     saved_revision: u64,
+    /// Clicks, strokes and verbs so far; undo takes none back.
+    pub n_interactions: u64,
+    /// Points that were selected or deselected, and hidden or shown, since the picture last took them; `None` when the picture
+    /// has to be told all.
+    toggled: Option<[PointSet; 2]>,
+    /// What turned with each change since colors and marks were last brought in step.
+    pub turned: Vec<Change>,
+    /// An exported file has the edits up to some moment.
+    was_exported: bool,
+    /// Where edits are written as they happen; `None` without a folder for it.
+    pub journal: Option<Journal>,
+    /// The user wants none of the edits so far; only until the next.
+    pub is_discarded: bool,
+    /// Journals that were left behind, until the user has said what becomes of them.
+    pub offers: VecDeque<Offer>,
+    /// What probably points to the wrong side.
+    pub suspects: SuspectsList,
+    /// What says the side of points, by kind.
+    pub kinds: SourceKinds,
+    /// The parts that hang together.
+    pub components: Components,
+    /// The viewpoints while they are moved.
+    pub viewpoints: Viewpoints,
+    /// The viewpoints of the running propagation, or of the last one when none runs.
+    pub requested_viewpoints: Arc<[glam::Vec3]>,
+    /// The end of the intervals of votes while it is dragged.
+    pub eta_draft: Option<f32>,
 }
 
 impl Session {
@@ -53,6 +90,19 @@ impl Session {
             n_without_normal,
             undecided: Vec::new(),
             saved_revision: document.signs_revision(),
+            n_interactions: 0,
+            toggled: None,
+            turned: Vec::new(),
+            was_exported: false,
+            journal: None,
+            is_discarded: false,
+            offers: VecDeque::new(),
+            suspects: SuspectsList::default(),
+            kinds: SourceKinds::default(),
+            components: Components::default(),
+            viewpoints: Viewpoints::default(),
+            requested_viewpoints: Arc::default(),
+            eta_draft: None,
             scan: Arc::new(scan),
             name,
             document,
@@ -76,6 +126,107 @@ impl Session {
     /// Remembers that the signs of `revision` are in an exported file.
     pub fn mark_saved(&mut self, revision: u64) {
         self.saved_revision = revision;
+        self.was_exported = true;
+        let is_newest = !self.is_unsaved();
+        if let Some(journal) = self.journal.as_mut().filter(|_| is_newest) {
+            journal.exported();
+        }
+    }
+
+    /// What tells the scan from others in recipes.
+    pub fn identity(&self) -> ScanIdentity {
+        self.scan.identity(&self.name)
+    }
+
+    /// Keeps a journal of the edits from now on, in `folder`. For a session without edits.
+    pub fn keep_journal(&mut self, folder: &Path) {
+        let head = Head::new(self.identity(), self.document.parameters());
+        self.journal = Some(Journal::new(folder, head));
+    }
+
+    /// Makes the edits of a journal again, with those that were undone, and goes on with it. For a session without edits; a propagation
+    /// may be due after it.
+    ///
+    /// # Errors
+    /// [`EditError`] when they do not fit the cloud; the edits before that are made, and the journal is left as it is.
+    pub fn restore(&mut self, offer: Offer) -> Result<(), EditError> {
+        self.begin_with(offer.reading.recipe.head.parameters);
+        let (steps, n_done) = offer.reading.recipe.history();
+        for step in &steps {
+            self.make_again(step)?;
+        }
+        for _ in n_done..steps.len() {
+            self.document.undo();
+        }
+        self.journal = Some(Journal::resume(offer));
+        Ok(())
+    }
+
+    /// Takes other parameters as those that the document began with, which are no edit. For a session without edits.
+    pub fn begin_with(&mut self, parameters: Parameters) {
+        let document = std::mem::replace(&mut self.document, Document::new(Arc::clone(&self.scan.cloud), None));
+        self.document = document.with_parameters(parameters);
+    }
+
+    /// Makes a recorded step again. It is not written into the journal.
+    fn make_again(&mut self, step: &RecordedStep) -> Result<Change, EditError> {
+        self.toggled = None;
+        let change = self
+            .document
+            .apply_recorded(step.kind, step.change.clone(), step.n_turned)?;
+        self.turned.push(change.clone());
+        Ok(change)
+    }
+
+    /// Makes a recorded step as an edit of its own, as when the user does the same once more.
+    ///
+    /// # Errors
+    /// [`EditError`] when it does not fit the cloud.
+    pub fn repeat(&mut self, step: &RecordedStep) -> Result<Change, EditError> {
+        let before = self.document.revision();
+        let change = self.make_again(step)?;
+        self.record(before);
+        self.prune_selection();
+        Ok(change)
+    }
+
+    /// Brings the document to the state at the end of a recipe, as one edit: sources, marks, sets, parameters and viewpoints are the
+    /// recipe's, and no others. A propagation may be due after it.
+    ///
+    /// # Errors
+    /// [`EditError`] when the recipe does not fit the cloud; the document is unchanged then.
+    pub fn take_recipe(&mut self, recipe: &Recipe) -> Result<Change, EditError> {
+        let change = StateChange::between(self.document.state(), &recipe.state());
+        self.repeat(&RecordedStep {
+            kind: EditKind::Recipe,
+            n_turned: 0,
+            change,
+        })
+    }
+
+    /// Ends the session: the journal goes, unless it has edits that no exported file has and that the user has not given up.
+    pub fn finish(mut self) {
+        let has_more = self.is_unsaved() || (!self.was_exported && !self.document.state().accepted.is_empty());
+        if let Some(journal) = self.journal.take().filter(|_| self.is_discarded || !has_more) {
+            journal.remove();
+        }
+    }
+
+    /// Takes the points that were selected or deselected, and hidden or shown, since the last call; `None` when the picture has to
+    /// be told all.
+    pub fn take_toggled(&mut self) -> Option<[PointSet; 2]> {
+        self.toggled.replace(Default::default())
+    }
+
+    /// Writes the last step into the journal, if there is one since the document's revision `before`.
+    fn record(&mut self, before: u64) {
+        if self.document.revision() == before {
+            return;
+        }
+        self.is_discarded = false;
+        if let (Some(journal), Some(step)) = (&mut self.journal, self.document.next_undo()) {
+            journal.step(step.kind(), step.change(), step.n_turned());
+        }
     }
 
     /// Makes a propagation the one in force. The first is what the file is without the user, so it is nothing to lose.
@@ -88,9 +239,12 @@ impl Session {
             .map(|(component, _)| component)
             .collect();
         self.requested = propagation.parameters;
+        self.requested_viewpoints = Arc::clone(&propagation.viewpoints);
         // What was asked for is a step of the history from now on; the first parameters are none.
         // It names no points, so it cannot be refused.
+        let before = self.document.revision();
         drop(self.document.apply(Edit::SetParameters(self.requested)));
+        self.record(before);
         self.document.install(propagation);
     }
 
@@ -117,7 +271,18 @@ impl Session {
             Edit::Mend(point) | Edit::TurnPatch { point, .. } | Edit::TurnWhole(point) => Some(point),
             _ => None,
         };
+        let is_interaction = match edit.kind() {
+            EditKind::SetParameters | EditKind::SetViewpoints | EditKind::Accept => false,
+            _ => true,
+        };
+        let before = self.document.revision();
         let change = self.document.apply(edit)?;
+        self.turned.push(change.clone());
+        self.record(before);
+        if self.document.revision() != before {
+            self.n_interactions += u64::from(is_interaction);
+            self.toggled = toggled_with(self.toggled.take(), self.document.next_undo());
+        }
         self.reveal = made;
         self.prune_selection();
         Ok(change)
@@ -126,6 +291,13 @@ impl Session {
     /// Takes the last edit back.
     pub fn undo(&mut self) -> Option<Change> {
         let change = self.document.undo();
+        self.turned.extend(change.clone());
+        if change.is_some() {
+            self.toggled = toggled_with(self.toggled.take(), self.document.next_redo());
+        }
+        if let Some(journal) = self.journal.as_mut().filter(|_| change.is_some()) {
+            journal.undo();
+        }
         self.prune_selection();
         change
     }
@@ -133,6 +305,13 @@ impl Session {
     /// Applies the last undone edit again.
     pub fn redo(&mut self) -> Option<Change> {
         let change = self.document.redo();
+        self.turned.extend(change.clone());
+        if change.is_some() {
+            self.toggled = toggled_with(self.toggled.take(), self.document.next_undo());
+        }
+        if let Some(journal) = self.journal.as_mut().filter(|_| change.is_some()) {
+            journal.redo();
+        }
         self.prune_selection();
         change
     }
@@ -150,6 +329,18 @@ impl Session {
             1 => format!("{start}, 1 source"),
             n_sources => format!("{start}, {n_sources} sources"),
         })
+    }
+
+    /// Where a recipe goes unless the user says otherwise: `<name>.normend` beside the scan, or in `folder` where there is no such
+    /// place.
+    pub fn suggested_recipe(&self, folder: Option<&Path>) -> PathBuf {
+        let stem = Path::new(&self.name).file_stem().unwrap_or_default().to_string_lossy();
+        let beside = self.scan.path().and_then(|path| path.parent()).map(Path::to_path_buf);
+        let folder = beside
+            .or_else(|| folder.map(Path::to_path_buf))
+            .or_else(documents)
+            .unwrap_or_default();
+        folder.join(format!("{stem}.{}", normend_io::recipe::EXTENSION))
     }
 
     /// Where an export goes unless the user says otherwise: `<name>_oriented.ply` in `folder`, or beside the scan.
@@ -176,6 +367,13 @@ impl Session {
             .unwrap_or_default();
         folder.join(format!("{stem}_oriented.{extension}"))
     }
+}
+
+/// What is toggled once a step was made or taken back as well. O(what it toggles, and what was toggled before).
+fn toggled_with(toggled: Option<[PointSet; 2]>, step: Option<&Step>) -> Option<[PointSet; 2]> {
+    let [selected, hidden] = toggled?;
+    let change = step?.change();
+    Some([selected ^ &change.selected, hidden ^ &change.hidden])
 }
 
 /// The component that `point` belongs to, as an index of the tree's roots. O(log components).

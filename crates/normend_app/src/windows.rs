@@ -7,9 +7,10 @@ use egui::Ui;
 use crate::app::App;
 use crate::command::{Action, Command};
 use crate::crash;
+use crate::journal::Journal;
 use crate::panels::modal::Modal;
 use crate::panels::preferences::Preferences;
-use crate::panels::{about, export, messages, open_path, palette, shortcuts, unsaved};
+use crate::panels::{about, export, messages, open_path, palette, screenshot, shortcuts, unsaved};
 use crate::session::Session;
 
 /// The windows over the editor; `None` or `false` is closed.
@@ -40,6 +41,9 @@ impl App {
     /// The window is up. Says what became of the last one: `report` is of a crash that the user was not told of yet.
     pub(crate) fn say_what_happened(&mut self, report: Option<PathBuf>) {
         crash::start(&self.adapter);
+        if crash::is_panic_asked_for() {
+            std::panic::panic_any("this panic was asked for");
+        }
         if let Some(report) = report {
             self.messages.error(format!(
                 "Normend closed unexpectedly the last time. A report for its makers is at {}.",
@@ -83,7 +87,7 @@ impl App {
             availability: &availability,
             recent_commands: &settings.recent_commands,
             recent_scans: &settings.recent,
-            mode: self.session.as_ref().map(|_| self.mode),
+            mode: self.session.as_ref().map(|_| self.display.coloring()),
         };
         window.ui(ui, &offers)
     }
@@ -102,10 +106,22 @@ impl App {
                     self.act(action);
                 }
             },
+            Some(Modal::Restore) => self.ask_offer(ui),
+            Some(Modal::SaveRecipe { window, of_offer }) => self.ask_save(ui, window, of_offer),
+            Some(Modal::OtherScan { recipe, name }) => self.ask_other_scan(ui, recipe, name),
+            Some(Modal::Picture(mut window)) => match window.ui(ui) {
+                screenshot::Decision::Wait => self.windows.modal = Some(Modal::Picture(window)),
+                screenshot::Decision::Close => {}
+                screenshot::Decision::Draw(order) => self.make_pictures(&order),
+            },
             Some(Modal::OpenPath(mut window)) => match window.ui(ui) {
                 open_path::Decision::Wait => self.windows.modal = Some(Modal::OpenPath(window)),
                 open_path::Decision::Close => {}
-                open_path::Decision::Open(path) => self.act(Action::OpenScan(path)),
+                open_path::Decision::Open(path) => self.act(match window.what {
+                    open_path::What::Scan => Action::OpenScan(path),
+                    open_path::What::Recipe => Action::OpenRecipe(path),
+                    open_path::What::Reference => Action::OpenReference(path),
+                }),
             },
             Some(Modal::Export(mut window)) => match window.ui(ui) {
                 export::Decision::Wait => self.windows.modal = Some(Modal::Export(window)),
@@ -122,7 +138,9 @@ impl App {
                 let session = self.session.as_ref();
                 let name = session.map_or("this scan", |session| &session.name);
                 let mends = session.is_none_or(Session::has_unsaved_mends);
-                match unsaved::ui(ui, name, mends) {
+                let journal = session.and_then(|session| session.journal.as_ref());
+                match unsaved::ui(ui, name, mends, journal.is_some_and(Journal::is_kept)) {
+                    unsaved::Decision::Keep => self.leave_now(leaving),
                     unsaved::Decision::Wait => self.windows.modal = Some(Modal::Unsaved(leaving)),
                     unsaved::Decision::Export => {
                         self.act(Command::Export.into());
@@ -131,7 +149,12 @@ impl App {
                             _ => self.windows.modal = Some(Modal::Unsaved(leaving)),
                         }
                     }
-                    unsaved::Decision::Discard => self.leave_now(leaving),
+                    unsaved::Decision::Discard => {
+                        if let Some(session) = &mut self.session {
+                            session.is_discarded = true;
+                        }
+                        self.leave_now(leaving);
+                    }
                     unsaved::Decision::Cancel => {}
                 }
             }

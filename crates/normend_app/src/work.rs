@@ -3,11 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use normend_core::evidence::Known;
 use normend_core::{Document, Parameters, PointCloud, Propagation};
 use normend_io::{ReadError, Scan, WriteError, WriteOptions};
 use normend_render::{CloudUploader, UploadedCloud};
 
 use crate::job::{Job, JobError, JobStatus};
+use crate::journal::{self, found::Findings};
+use crate::picture_job::{Made, PictureTarget};
+use crate::recipes::JournalFolder;
 use crate::scene_sync::{upload_oriented, upload_points};
 use crate::session::Session;
 use crate::theme;
@@ -71,12 +75,20 @@ pub struct Uploaded<T> {
     pub cloud: Option<UploadedCloud>,
 }
 
+/// A scan that was read, with the journals of it.
+pub struct Opened {
+    /// The scan.
+    pub scan: Scan,
+    /// The journals.
+    pub findings: Findings,
+}
+
 /// The running job with what is needed when it ends.
 pub enum Work {
     /// A scan is read.
     Open {
         /// The reading.
-        job: Job<Uploaded<Scan>>,
+        job: Job<Uploaded<Opened>>,
         /// Where from.
         origin: ScanOrigin,
     },
@@ -88,6 +100,13 @@ pub enum Work {
         parameters: Parameters,
         /// The user asked for it; else the document does, after parameters were taken back.
         is_asked: bool,
+    },
+    /// Pictures of the view are drawn.
+    Pictures {
+        /// The drawing.
+        job: Job<Made>,
+        /// Where they go.
+        target: PictureTarget,
     },
     /// The open scan is written.
     Export {
@@ -102,7 +121,12 @@ pub enum Work {
 
 impl Work {
     /// Starts to read a scan.
-    pub fn open(ctx: &egui::Context, origin: ScanOrigin, uploader: Option<CloudUploader>) -> Self {
+    pub fn open(
+        ctx: &egui::Context,
+        origin: ScanOrigin,
+        journals: Option<JournalFolder>,
+        uploader: Option<CloudUploader>,
+    ) -> Self {
         let source = origin.clone();
         let job = Job::start(ctx, "open", "Reading", move |progress| {
             let scan = match &source {
@@ -115,7 +139,13 @@ impl Work {
             })?;
             progress.stage("Preparing the picture");
             let cloud = uploader.and_then(|uploader| upload_points(&uploader, &scan.cloud).ok());
-            Ok(Uploaded { result: scan, cloud })
+            // Hashes the file, and the editor needs that with its first edit.
+            let identity = scan.identity(&source.name());
+            let findings = journals.map_or_else(Findings::default, |folder| {
+                journal::found::find(&folder.path, &identity, folder.patience)
+            });
+            let opened = Opened { scan, findings };
+            Ok(Uploaded { result: opened, cloud })
         });
         Self::Open { job, origin }
     }
@@ -130,9 +160,14 @@ impl Work {
     ) -> Self {
         let cloud: Arc<PointCloud> = Arc::clone(document.cloud());
         let given = document.given_normals().cloned();
+        let viewpoints = Arc::clone(&document.state().viewpoints);
         let job = Job::start(ctx, "propagate", "Finding neighbors", move |progress| {
-            let given = given.as_ref().map(|normals| normals.as_slice());
-            let propagation = Propagation::new(&cloud, given, parameters, progress)?;
+            let known = Known {
+                given: given.as_ref().map(|normals| normals.as_slice()),
+                viewpoints: &viewpoints,
+                ..Known::default()
+            };
+            let propagation = Propagation::new(&cloud, known, parameters, progress)?;
             progress.stage("Preparing the picture");
             let uploaded = uploader.and_then(|uploader| upload_oriented(&uploader, &cloud, &propagation).ok());
             Ok(Uploaded {
@@ -175,6 +210,7 @@ impl Work {
         match self {
             Self::Open { origin, .. } => format!("Opening {}", theme::elided(&origin.name(), MAX_NAME)),
             Self::Propagate { .. } => "Orienting normals".to_owned(),
+            Self::Pictures { .. } => "Drawing pictures".to_owned(),
             Self::Export { path, .. } => {
                 let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
                 format!("Exporting {}", theme::elided(&name, MAX_NAME))
@@ -188,6 +224,7 @@ impl Work {
             Self::Open { job, .. } => job.status(),
             Self::Propagate { job, .. } => job.status(),
             Self::Export { job, .. } => job.status(),
+            Self::Pictures { job, .. } => job.status(),
         }
     }
 
@@ -197,6 +234,7 @@ impl Work {
             Self::Open { job, .. } => job.cancel(),
             Self::Propagate { job, .. } => job.cancel(),
             Self::Export { job, .. } => job.cancel(),
+            Self::Pictures { job, .. } => job.cancel(),
         }
     }
 }

@@ -5,6 +5,7 @@ pub mod check;
 pub mod generate;
 pub mod orient;
 pub mod render;
+pub mod replay;
 pub mod suspects;
 
 use std::fmt;

@@ -6,7 +6,18 @@ mod table;
 use std::path::PathBuf;
 
 use normend_core::Parameters;
-use normend_render::{DisplayMode, StandardView};
+use normend_render::StandardView;
+
+use crate::coloring::Coloring;
+use crate::compare::Style;
+
+use crate::components::ComponentAction;
+use crate::source_kinds::SourceKind;
+use crate::suspects_list::SuspectAction;
+use crate::viewpoints::ViewpointAction;
+
+use crate::tools::point_tool::Means;
+use crate::viewport::Pixel;
 
 pub use keys::{Keymap, MOUSE, shortcut_text, take_shortcuts};
 pub use table::Command;
@@ -18,10 +29,25 @@ pub enum Action {
     Run(Command),
     /// Open this scan.
     OpenScan(PathBuf),
+    /// Open this recipe for the scan.
+    OpenRecipe(PathBuf),
     /// Forget the recent scans.
     ClearRecent,
     /// Color the splats this way.
-    Display(DisplayMode),
+    Display(Coloring),
+    /// Select the points whose shown value is in this range, both ends included.
+    SelectValues {
+        /// The range.
+        range: [f64; 2],
+        /// How they join the selection.
+        modifiers: egui::Modifiers,
+    },
+    /// Compare in this way, or stop comparing when it is on in this way.
+    Compare(Style),
+    /// Compare with this file.
+    OpenReference(PathBuf),
+    /// Fly to this one of the listed wrong regions.
+    ShowWrong(usize),
     /// Propagate again with these parameters; the sources stay.
     Propagate(Parameters),
     /// Take steps back, or do them again, until so many are done.
@@ -33,12 +59,33 @@ pub enum Action {
         /// Add to or take from the selection instead of replacing it.
         extend: bool,
     },
+    /// Do this with what is at a pixel of the view.
+    Point {
+        /// The pixel.
+        pixel: Pixel,
+        /// What is meant with it.
+        means: Means,
+    },
+    /// Turn the view around what is at a pixel.
+    Pivot(Pixel),
     /// Bring this point into view.
     FlyTo(u32),
     /// Turn the sources at these points.
     FlipSources(Vec<u32>),
     /// Remove the sources at these points.
     RemoveSources(Vec<u32>),
+    /// Propagate again with these parameters, unless other work is in the way.
+    ProposeParameters(Parameters),
+    /// Show the marks of a kind of sources in the view, or not.
+    ShowKind(SourceKind, bool),
+    /// Drop all that is of a kind of sources.
+    DropKind(SourceKind),
+    /// Something about viewpoints.
+    Viewpoints(ViewpointAction),
+    /// Something about components.
+    Components(ComponentAction),
+    /// Something about suspects.
+    Suspects(SuspectAction),
     /// Ask the running job to stop.
     CancelJob,
     /// Let the user pick the target of the export with the system's dialog.

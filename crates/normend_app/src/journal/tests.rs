@@ -51,7 +51,10 @@ fn every_edit_is_in_the_file_before_it_returns() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path().join("journals");
     let mut journal = Journal::new(&folder, head());
-    assert!(!folder.exists() && journal.path().is_none(), "nothing is written before the first edit");
+    assert!(
+        !folder.exists() && journal.path().is_none(),
+        "nothing is written before the first edit"
+    );
     select(&mut journal, 0..1);
     let path = journal.path().unwrap();
     assert_eq!(path, folder.join("0101010101010101-a_scan.ply.journal"));
@@ -67,14 +70,20 @@ fn every_edit_is_in_the_file_before_it_returns() {
     assert!(find_in(&folder).offers.is_empty());
     let mut other = Journal::new(&folder, head());
     select(&mut other, 7..8);
-    assert_eq!(other.path().unwrap(), folder.join("0101010101010101-a_scan.ply-2.journal"));
+    assert_eq!(
+        other.path().unwrap(),
+        folder.join("0101010101010101-a_scan.ply-2.journal")
+    );
     assert_eq!(selected(&path), [0, 1, 2]);
     drop(journal);
     drop(other);
     let findings = find_in(&folder);
     assert_eq!(findings.offers.len(), 2);
     // The newest first.
-    assert_eq!(findings.offers.iter().map(found::Offer::n_edits).collect::<Vec<_>>(), [1, 3]);
+    assert_eq!(
+        findings.offers.iter().map(found::Offer::n_edits).collect::<Vec<_>>(),
+        [1, 3]
+    );
 }
 
 #[test]
@@ -113,7 +122,14 @@ fn what_is_damaged_is_said_and_kept() {
     let path = journal.path().unwrap();
     drop(journal);
     let mut bytes = fs::read(&path).unwrap();
-    let third_line = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'\n').nth(1).unwrap().0 + 10;
+    let third_line = bytes
+        .iter()
+        .enumerate()
+        .filter(|(_, byte)| **byte == b'\n')
+        .nth(1)
+        .unwrap()
+        .0
+        + 10;
     bytes[third_line] ^= 1;
     fs::write(&path, &bytes).unwrap();
     let offer = find_in(folder.path()).offers.pop().unwrap();
@@ -130,7 +146,10 @@ fn what_is_exported_is_not_offered_unless_there_was_more() {
     let folder = tempfile::tempdir().unwrap();
     let mut journal = Journal::new(folder.path(), head());
     journal.exported();
-    assert!(journal.path().is_none(), "nothing was done, so there is nothing to write");
+    assert!(
+        journal.path().is_none(),
+        "nothing was done, so there is nothing to write"
+    );
     select(&mut journal, 0..1);
     journal.exported();
     select(&mut journal, 1..2);
@@ -166,7 +185,11 @@ fn journals_of_other_files_and_of_changed_ones_are_told_apart() {
     fs::write(folder.path().join("0101010101010101-x.journal"), "PLY").unwrap();
     let findings = find_in(folder.path());
     assert_eq!(findings.offers.len(), 1);
-    assert!(findings.problems[0].contains("this is no recipe"), "{:?}", findings.problems);
+    assert!(
+        findings.problems[0].contains("this is no recipe"),
+        "{:?}",
+        findings.problems
+    );
 }
 
 #[test]

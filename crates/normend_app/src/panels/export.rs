@@ -1,4 +1,4 @@
-//! The export window: where the oriented scan goes. Replacing a file needs a second word.
+//! The export window: where the oriented scan goes, or a recipe. Replacing a file needs a second word.
 
 use std::path::{Path, PathBuf};
 
@@ -15,6 +15,7 @@ const PROBLEM_HEIGHT: f32 = 38.0;
 /// The window with the target's path.
 #[derive(Clone, Debug)]
 pub struct ExportWindow {
+    words: &'static Words,
     path: String,
     input: Option<PathBuf>,
     replace: bool,
@@ -22,6 +23,33 @@ pub struct ExportWindow {
     checked: Option<(String, Existing)>,
     problem: Option<String>,
 }
+
+/// What the window is about.
+#[derive(Debug)]
+struct Words {
+    title: &'static str,
+    about: &'static str,
+    field: &'static str,
+    button: &'static str,
+    /// The file that was opened can be the target.
+    may_replace_input: bool,
+}
+
+const EXPORT: Words = Words {
+    title: "Export",
+    about: "The file as it was read, with oriented unit normals nx ny nz.",
+    field: "Export to",
+    button: "Export",
+    may_replace_input: true,
+};
+
+const RECIPE: Words = Words {
+    title: "Save recipe",
+    about: "What you decided, without the points: it can be opened with this scan again, or replayed without a window.",
+    field: "Save to",
+    button: "Save",
+    may_replace_input: false,
+};
 
 /// What is at the target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,12 +82,21 @@ impl ExportWindow {
     /// Suggests `path`. `input` is the file that was opened, which is never replaced without asking.
     pub fn new(path: &Path, input: Option<PathBuf>) -> Self {
         Self {
+            words: &EXPORT,
             path: path.display().to_string(),
             input,
             replace: false,
             wants_focus: true,
             checked: None,
             problem: None,
+        }
+    }
+
+    /// The window for a recipe. `input` is the scan that was opened, which is never replaced.
+    pub fn for_recipe(path: &Path, input: Option<PathBuf>) -> Self {
+        Self {
+            words: &RECIPE,
+            ..Self::new(path, input)
         }
     }
 
@@ -109,6 +146,7 @@ impl ExportWindow {
         match self.existing() {
             Existing::Nothing => None,
             Existing::Folder => Some("This is a folder: add a file name."),
+            Existing::Input if !self.words.may_replace_input => Some("This is the opened scan: type another name."),
             Existing::File | Existing::Input if self.replace => None,
             Existing::File => Some("This file exists: tick “Replace the existing file”, or type another name."),
             Existing::Input => Some("This is the opened scan: tick “Replace the scan”, or type another name."),
@@ -117,14 +155,13 @@ impl ExportWindow {
 
     /// Shows the window.
     pub fn ui(&mut self, ui: &Ui) -> Decision {
-        modal::show(ui, "Export", WIDTH, |ui| self.content(ui))
+        modal::show(ui, self.words.title, WIDTH, |ui| self.content(ui))
     }
 
     fn content(&mut self, ui: &mut Ui) -> Decision {
         let mut decision = Decision::Wait;
-        let about = "The file as it was read, with oriented unit normals nx ny nz.";
-        ui.add(Label::new(RichText::new(about).weak()).wrap());
-        let label = ui.label("Export to");
+        ui.add(Label::new(RichText::new(self.words.about).weak()).wrap());
+        let label = ui.label(self.words.field);
         ui.horizontal(|ui| {
             let field = ui.add(TextEdit::singleline(&mut self.path).desired_width(416.0));
             let field = field.labelled_by(label.id);
@@ -145,6 +182,7 @@ impl ExportWindow {
             ui.set_min_height(ui.spacing().interact_size.y);
             let replace = match existing {
                 Existing::Nothing | Existing::Folder => return,
+                Existing::Input if !self.words.may_replace_input => return,
                 Existing::File => "Replace the existing file",
                 Existing::Input => "Replace the scan that was opened",
             };
@@ -154,7 +192,8 @@ impl ExportWindow {
         });
         ui.vertical(|ui| {
             ui.set_min_height(PROBLEM_HEIGHT);
-            if existing == Existing::Folder && self.problem.is_none() {
+            let is_never = existing == Existing::Input && !self.words.may_replace_input;
+            if (existing == Existing::Folder || is_never) && self.problem.is_none() {
                 self.problem = self.refusal().map(str::to_owned);
             }
             if let Some(problem) = &self.problem {
@@ -165,7 +204,7 @@ impl ExportWindow {
         ui.horizontal(|ui| {
             let enter = modal::enter_pressed(ui);
             let refusal = self.refusal();
-            let export = ui.add_enabled(refusal.is_none(), theme::primary_button(ui, "Export"));
+            let export = ui.add_enabled(refusal.is_none(), theme::primary_button(ui, self.words.button));
             let export = export.on_disabled_hover_text(refusal.unwrap_or_default());
             if export.clicked() || enter {
                 match (refusal, typed_path(&self.path)) {

@@ -59,7 +59,7 @@ fn detail(step: &Step) -> String {
     let counted = |n: u64| theme::counted(n, "point", "points");
     match step.kind() {
         EditKind::SetParameters | EditKind::SetViewpoints => String::new(),
-        EditKind::Select | EditKind::Hide | EditKind::Accept | EditKind::Pin | EditKind::Unpin => {
+        EditKind::Select | EditKind::Hide | EditKind::Accept | EditKind::Pin | EditKind::Unpin | EditKind::Recipe => {
             counted(step.change().n_points())
         }
         _ => counted(step.n_turned()),

@@ -3,6 +3,9 @@
 use crate::command::Command;
 
 pub mod about;
+pub mod compare;
+pub mod components;
+pub mod context_menu;
 pub mod empty;
 pub mod export;
 pub mod hints;
@@ -16,12 +19,21 @@ pub mod orient;
 pub mod palette;
 pub mod preferences;
 pub mod progress;
+pub mod proposal;
+pub mod restore;
+pub(crate) mod screenshot;
 pub mod shortcuts;
 pub mod side;
 pub mod sources;
+pub mod split_line;
 pub mod status_bar;
+pub mod suspects;
+pub mod tool_bar;
 pub mod unsaved;
+pub mod values;
 pub mod view;
+pub mod viewpoints;
+pub mod votes;
 
 /// Says whether a command can be run now, and if not, why.
 pub type Availability<'a> = dyn Fn(Command) -> Result<(), &'static str> + 'a;

@@ -1,10 +1,14 @@
 //! Windows that have the keyboard and the pointer to themselves until they are closed; one at a time.
 
+use std::sync::Arc;
+
 use egui::{Id, Key, RichText, Ui};
+use normend_io::recipe::Recipe;
 
 use super::export::ExportWindow;
 use super::open_path::OpenPathWindow;
 use super::palette::PaletteWindow;
+use super::screenshot::PictureWindow;
 use crate::app::Leaving;
 use crate::theme::{SPACE_L, SPACE_S};
 
@@ -15,6 +19,14 @@ pub(crate) enum Modal {
     Export(ExportWindow),
     /// Which scan to open.
     OpenPath(OpenPathWindow),
+    /// Where the recipe goes; `of_offer` when it is made of a journal that is offered.
+    SaveRecipe { window: ExportWindow, of_offer: bool },
+    /// What becomes of a journal that was left behind.
+    Restore,
+    /// Whether a recipe of another file is meant.
+    OtherScan { recipe: Arc<Recipe>, name: String },
+    /// Pictures of the view.
+    Picture(PictureWindow),
     /// What to do, found by a few letters.
     Palette(PaletteWindow),
     /// Whether mends may be lost.

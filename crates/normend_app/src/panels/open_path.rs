@@ -1,4 +1,4 @@
-//! Opening a scan by typing its path: works where no file dialog does.
+//! Opening a scan or a recipe by typing its path: works where no file dialog does.
 
 use std::path::PathBuf;
 
@@ -10,9 +10,23 @@ use crate::theme::{self, SPACE_S};
 /// The window with the path field.
 #[derive(Clone, Debug, Default)]
 pub struct OpenPathWindow {
+    /// What is opened.
+    pub what: What,
     path: String,
     note: Option<String>,
     focused_once: bool,
+}
+
+/// What is opened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum What {
+    /// A scan.
+    #[default]
+    Scan,
+    /// A recipe, for the scan that is open.
+    Recipe,
+    /// A file that the open scan is compared with.
+    Reference,
 }
 
 /// What the user decided.
@@ -28,8 +42,9 @@ pub enum Decision {
 
 impl OpenPathWindow {
     /// An empty field; `note` says why it is shown when the user did not ask for it.
-    pub fn new(note: Option<String>) -> Self {
+    pub fn new(what: What, note: Option<String>) -> Self {
         Self {
+            what,
             note,
             ..Self::default()
         }
@@ -37,7 +52,12 @@ impl OpenPathWindow {
 
     /// Shows the window.
     pub fn ui(&mut self, ui: &Ui) -> Decision {
-        modal::show(ui, "Open a scan", 460.0, |ui| self.content(ui))
+        let title = match self.what {
+            What::Scan => "Open a scan",
+            What::Recipe => "Open a recipe",
+            What::Reference => "Compare with a reference",
+        };
+        modal::show(ui, title, 460.0, |ui| self.content(ui))
     }
 
     fn content(&mut self, ui: &mut Ui) -> Decision {
@@ -45,7 +65,11 @@ impl OpenPathWindow {
         if let Some(note) = &self.note {
             ui.add(egui::Label::new(RichText::new(note).weak()).wrap());
         }
-        let label = ui.label("Path of the scan");
+        let label = ui.label(match self.what {
+            What::Scan => "Path of the scan",
+            What::Recipe => "Path of the recipe",
+            What::Reference => "Path of the reference",
+        });
         let field = ui.add(TextEdit::singleline(&mut self.path).desired_width(f32::INFINITY));
         let field = field.labelled_by(label.id);
         let path = typed_path(&self.path);

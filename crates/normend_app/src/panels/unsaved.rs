@@ -12,14 +12,16 @@ pub enum Decision {
     Wait,
     /// Export first, then go on.
     Export,
+    /// Go on; the mends are offered again when the scan is opened the next time.
+    Keep,
     /// Go on without the mends.
     Discard,
     /// Stay.
     Cancel,
 }
 
-/// Asks about the scan called `name`: about its mends, or else about its new propagation.
-pub fn ui(ui: &Ui, name: &str, mends: bool) -> Decision {
+/// Asks about the scan called `name`: about its mends, or else about its new propagation. They can be kept where `is_journaled`.
+pub fn ui(ui: &Ui, name: &str, mends: bool, is_journaled: bool) -> Decision {
     let name = theme::elided(name, 60);
     let (title, what) = if mends {
         (
@@ -32,7 +34,7 @@ pub fn ui(ui: &Ui, name: &str, mends: bool) -> Decision {
             format!("The new propagation of {name} is in no exported file yet."),
         )
     };
-    modal::show(ui, title, 400.0, |ui| {
+    modal::show(ui, title, 420.0, |ui| {
         let mut decision = Decision::Wait;
         ui.add(Label::new(what).wrap());
         ui.add_space(SPACE_S);
@@ -40,6 +42,12 @@ pub fn ui(ui: &Ui, name: &str, mends: bool) -> Decision {
             let enter = modal::enter_pressed(ui);
             if ui.add(theme::primary_button(ui, "Export…")).clicked() || enter {
                 decision = Decision::Export;
+            }
+            let keep = ui.add_enabled(is_journaled, egui::Button::new("Keep for next time"));
+            let keep = keep.on_hover_text("They are offered when this scan is opened again");
+            let keep = keep.on_disabled_hover_text("Edits are not being journaled, see the messages");
+            if keep.clicked() {
+                decision = Decision::Keep;
             }
             if ui.button("Discard").clicked() {
                 decision = Decision::Discard;

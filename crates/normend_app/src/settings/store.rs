@@ -27,6 +27,8 @@ pub struct SettingsStore {
     pub settings: Settings,
     saved: Settings,
     folder: Option<PathBuf>,
+    /// Of journals and crash reports.
+    state_folder: Option<PathBuf>,
 }
 
 impl SettingsStore {
@@ -35,19 +37,24 @@ impl SettingsStore {
     /// The second value says in words what was wrong with the file, if anything.
     pub fn load() -> (Self, Option<String>) {
         match folders::config_folder() {
-            Some(folder) => Self::load_from(&folder),
+            Some(folder) => {
+                let (store, problem) = Self::load_from(&folder);
+                let state_folder = folders::state_folder();
+                (Self { state_folder, ..store }, problem)
+            }
             None => (
                 Self {
                     settings: Settings::default(),
                     saved: Settings::default(),
                     folder: None,
+                    state_folder: folders::state_folder(),
                 },
                 Some("Settings are not kept: this system names no configuration folder.".to_owned()),
             ),
         }
     }
 
-    /// Reads the settings kept in `folder`; a missing file gives the defaults.
+    /// Reads the settings kept in `folder`; a missing file gives the defaults. Journals lie in `state` inside it.
     pub fn load_from(folder: &Path) -> (Self, Option<String>) {
         let (settings, problem) = read(folder);
         (
@@ -55,9 +62,15 @@ impl SettingsStore {
                 saved: settings.clone(),
                 settings,
                 folder: Some(folder.to_path_buf()),
+                state_folder: Some(folder.join("state")),
             },
             problem,
         )
+    }
+
+    /// Where journals lie; `None` when the system names no folder for them. It need not exist.
+    pub fn journals_folder(&self) -> Option<PathBuf> {
+        Some(self.state_folder.as_ref()?.join("journals"))
     }
 
     /// Writes what changed since the last call, if anything. What another editor wrote meanwhile stays.

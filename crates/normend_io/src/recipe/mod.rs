@@ -176,7 +176,11 @@ impl Recipe {
         let joined = RecordedStep {
             kind: EditKind::Recipe,
             change: StateChange::between(&self.first_state(), &state),
-            n_turned: steps[..n_joined].iter().map(|step| step.n_turned).max().unwrap_or_default(),
+            n_turned: steps[..n_joined]
+                .iter()
+                .map(|step| step.n_turned)
+                .max()
+                .unwrap_or_default(),
         };
         let joined = Some(joined).filter(|_| n_joined > 0);
         let kept = steps[n_joined..].iter().map(|&step| step.clone());

@@ -1,0 +1,72 @@
+//! What can be typed after `normend replay`, and after `normend rehearse`, which tests use.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{CommonArguments, PropagationArguments};
+
+/// `normend replay`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Does again what was decided in the editor: the output has the same bytes as an export from there. A recipe is saved in the \
+editor (Ctrl-S); journals, which the editor keeps of unexported edits, are recipes too. Nothing is written but the output and the \
+report.
+
+The recipe must be of IN's very content. Where IN holds the same points in the same order but other values beside them, \
+--same-points allows it. Flags of the method replace parameters of the recipe; what was decided stays as it is, and the rest is \
+oriented anew around it.
+
+The report (--json) has one line, an object with recipe, input, output, points, left_out (rows without finite coordinates), edits, \
+sources, marks (points set for themselves), pinned, same_content, rule (what decided the sides, in words), parameters, seconds \
+(read, orient, write, total) and peak_rss_bytes (null where the system does not tell). A failed replay has recipe, input and error.
+
+Examples:
+  normend replay church.normend church.ply -o church_oriented.ply
+  normend replay church.normend church.ply -o church_tree.ply --preset tree --k-graph 8
+  normend replay church.normend church_colored.ply -o out.ply --same-points --json - | jq .edits")]
+pub struct ReplayArguments {
+    /// Recipe that the editor saved
+    #[arg(value_name = "RECIPE")]
+    pub recipe: PathBuf,
+
+    /// Scan that it was made for: PLY, or XYZ text
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+
+    /// File to write
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+
+    /// IN is another file than the recipe's, with the same points in the same order
+    #[arg(long)]
+    pub same_points: bool,
+
+    /// How signs are found, in place of what the recipe says.
+    #[command(flatten)]
+    pub propagation: PropagationArguments,
+
+    /// Write a report, a JSON object, to FILE or to standard output (-)
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+
+    /// Allow the output to replace a file that exists, the input too
+    #[arg(long)]
+    pub overwrite: bool,
+
+    /// What every command takes.
+    #[command(flatten)]
+    pub common: CommonArguments,
+}
+
+/// `normend rehearse`.
+#[derive(Debug, Args)]
+pub struct RehearseArguments {
+    /// Recipe whose events are done one after another
+    #[arg(value_name = "RECIPE")]
+    pub recipe: PathBuf,
+
+    /// Scan that it was made for
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+}
