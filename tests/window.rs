@@ -335,6 +335,57 @@ fn the_editor_comes_back_when_the_graphics_device_is_lost() {
 }
 
 #[test]
+fn a_crash_leaves_a_report_that_the_next_start_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    normend(folder, "generate part -o scan.ply --points 2000");
+    if !can_run(folder, "scan.ply") {
+        return;
+    }
+    let display = Display::start(folder);
+    let log = || fs::read_to_string(folder.join("log")).unwrap();
+    let mut crashing = Killed(editor(folder, &display).env("NORMEND_PANIC", "1").spawn().unwrap());
+    let status = display.wait_for("the end of the editor", |_| crashing.0.try_wait().unwrap());
+    assert_eq!(status.code(), Some(1), "{}", log());
+    let reports: Vec<_> = fs::read_dir(folder.join("state"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "txt"))
+        .collect();
+    assert_eq!(reports.len(), 1, "{reports:?}");
+    let path = reports[0].display().to_string();
+    assert!(log().contains(&format!("A report is at {path}")), "{}", log());
+    let report = fs::read_to_string(&reports[0]).unwrap();
+    for part in [
+        "this panic was asked for",
+        "Graphics: ",
+        "Backtrace:",
+        env!("CARGO_PKG_VERSION"),
+    ] {
+        assert!(report.contains(part), "{part}: {report}");
+    }
+    // The next start names it once.
+    for is_told in [true, false] {
+        let mut next = Killed(editor(folder, &display).spawn().unwrap());
+        let blank = display.shot();
+        display.wait_for("the window", |shot| {
+            (shot.n_changed_since(&blank) > 50_000).then_some(())
+        });
+        display.wait_for_rest();
+        assert_eq!(
+            log().contains("Normend closed unexpectedly the last time"),
+            is_told,
+            "{}",
+            log()
+        );
+        display.xdotool(&["search", "--onlyvisible", "--name", "Normend", "windowfocus", "--sync"]);
+        display.xdotool(&["key", "ctrl+q"]);
+        let status = display.wait_for("the end of the editor", |_| next.0.try_wait().unwrap());
+        assert!(status.success(), "{}", log());
+    }
+}
+
+#[test]
 fn a_wrong_patch_is_mended_in_the_window() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

@@ -22,6 +22,8 @@ const N_REPORTS: usize = 10;
 const RESTARTED_VARIABLE: &str = "NORMEND_RESTARTED";
 /// Asks for a loss of the graphics device, see [`is_loss_asked_for`].
 const LOSE_VARIABLE: &str = "NORMEND_LOSE_DEVICE";
+/// Asks for a panic, see [`is_panic_asked_for`].
+const PANIC_VARIABLE: &str = "NORMEND_PANIC";
 /// An editor that came up again and is lost within this time would be lost again.
 const SHORTEST_RUN: Duration = Duration::from_secs(15);
 
@@ -97,6 +99,11 @@ pub(crate) struct DeviceLost {
 /// Leaves a window whose graphics device is lost, after the program was started again. Unwinds to `run`.
 pub(crate) fn leave_lost() -> ! {
     std::panic::resume_unwind(Box::new(DeviceLost { restarted: restart() }))
+}
+
+/// Whether this editor shall panic when its window comes up: so reports can be tried out.
+pub(crate) fn is_panic_asked_for() -> bool {
+    std::env::var_os(PANIC_VARIABLE).is_some()
 }
 
 /// Whether this editor shall lose its graphics device once it shows a scan: so the way back can be tried out.
