@@ -35,6 +35,13 @@ pub const SOURCE_KEPT: [f32; 3] = [0.18, 0.72, 0.36];
 pub const SOURCE_FLIPPED: [f32; 3] = [0.93, 0.35, 0.68];
 /// Color of a source that was voted for, which the user had no hand in.
 pub const SOURCE_VOTED: [f32; 3] = [0.86, 0.79, 0.42];
+/// Color of a pinned point: the light of a pin's head, apart from both sides of all palettes.
+pub const SOURCE_PINNED: [f32; 3] = [0.95, 0.96, 0.98];
+/// Color of a point whose normal came with the file.
+pub const SOURCE_GIVEN: [f32; 3] = [0.47, 0.50, 0.55];
+
+/// Over what a figure under way covers: the color of selected points, thin enough to see through.
+pub const SELECTION_VEIL: Color32 = Color32::from_rgba_premultiplied(66, 8, 45, 77);
 
 /// The colors of one theme that are not egui's own names.
 struct Colors {
@@ -456,7 +463,10 @@ mod tests {
                         .fold(f32::INFINITY, f32::min);
                     assert!(worst >= 11.0, "{choice:?}, {vision}, in unlike light: {worst:.1}");
                     let highlighted = distance(seen(palette.front, 1.0), seen(palette.highlight, 1.0));
-                    assert!(highlighted >= 10.0, "{choice:?}, {vision}: highlight at {highlighted:.1}");
+                    assert!(
+                        highlighted >= 10.0,
+                        "{choice:?}, {vision}: highlight at {highlighted:.1}"
+                    );
                 }
             }
         }

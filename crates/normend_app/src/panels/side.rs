@@ -2,7 +2,7 @@
 
 use egui::{Button, Ui, Vec2};
 
-use crate::theme::{self, SPACE_XS};
+use crate::theme::SPACE_XS;
 
 /// What the side panel shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -13,6 +13,8 @@ pub enum SideTab {
     Orient,
     /// Who vouches for which point.
     Sources,
+    /// What probably points to the wrong side.
+    Suspects,
     /// How the scan is shown.
     View,
     /// What was done.
@@ -21,13 +23,14 @@ pub enum SideTab {
 
 impl SideTab {
     /// All tabs, from left to right.
-    pub const ALL: [Self; 4] = [Self::Orient, Self::Sources, Self::View, Self::History];
+    pub const ALL: [Self; 5] = [Self::Orient, Self::Sources, Self::Suspects, Self::View, Self::History];
 
     /// The name on the tab.
     pub fn label(self) -> &'static str {
         match self {
             Self::Orient => "Orient",
             Self::Sources => "Sources",
+            Self::Suspects => "Suspects",
             Self::View => "View",
             Self::History => "History",
         }
@@ -38,6 +41,7 @@ impl SideTab {
         match self {
             Self::Orient => "The scan, and how it is oriented",
             Self::Sources => "The points whose side is vouched for",
+            Self::Suspects => "What probably points to the wrong side",
             Self::View => "How the scan is shown",
             Self::History => "What was done; click to go back",
         }
@@ -48,10 +52,10 @@ impl SideTab {
 pub fn tabs(ui: &mut Ui, open: &mut SideTab) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = SPACE_XS;
-        let n_tabs = SideTab::ALL.len() as f32;
-        let width = (theme::SIDE_CONTENT_WIDTH - (n_tabs - 1.0) * SPACE_XS) / n_tabs;
+        // As narrow as keeps all of them in one row.
+        ui.spacing_mut().button_padding.x = SPACE_XS;
         for tab in SideTab::ALL {
-            let button = Button::selectable(*open == tab, tab.label()).min_size(Vec2::new(width, 26.0));
+            let button = Button::selectable(*open == tab, tab.label()).min_size(Vec2::new(0.0, 26.0));
             if ui.add(button).on_hover_text(tab.tooltip()).clicked() {
                 *open = tab;
             }

@@ -1,38 +1,104 @@
-//! The list of sources: select, flip, remove, fly to. Only the rows in sight are laid out.
+//! Who says which side is right: kinds of sources, the list of the user's own, votes, viewpoints, and the parts with their rules.
 
 use egui::{Button, Color32, RichText, ScrollArea, Ui, Vec2};
 use normend_core::sources::Origin;
 
+use super::{components, viewpoints, votes};
 use crate::command::{Action, Command};
 use crate::session::Session;
+use crate::source_kinds::SourceKind;
 use crate::theme::{self, SPACE_S, SPACE_XS};
 
 const ROW_HEIGHT: f32 = 24.0;
 const LIST_HEIGHT: f32 = 180.0;
+/// Radius of the ball beside the name of a kind, in points.
+const BALL: f32 = 5.0;
+
+/// What the kinds are.
+const ABOUT_KINDS: &str = "What says the side of points, by kind. The box shows or hides it in the view.";
 
 /// What the words of the rows mean.
-pub const ABOUT: &str = "Points whose side you decided.\nFlipped: the source turned its point.\n\
-                         Kept: it holds the side that the point has without sources.";
+const ABOUT_LIST: &str = "Points whose side you decided.\nFlipped: the source turned its point.\n\
+                          Kept: it holds the side that the point has without sources.";
 
-/// The list and its buttons.
-pub fn ui(ui: &mut Ui, session: &mut Session) -> Option<Action> {
+/// The tab. `blocked` says why nothing can be oriented again now.
+pub fn ui(ui: &mut Ui, session: &mut Session, blocked: Option<&str>) -> Option<Action> {
+    let mut action = theme::section_about(ui, "Sources", ABOUT_KINDS, |ui| kinds(ui, session, blocked));
+    if !session.document.sources().is_empty() {
+        let listed = theme::section_about(ui, "Your sources", ABOUT_LIST, |ui| list(ui, session));
+        action = action.or(listed);
+    }
+    if session.document.propagation().is_some() {
+        let voted = theme::section_about(ui, "Votes", votes::ABOUT, |ui| {
+            ui.add_enabled_ui(blocked.is_none(), |ui| votes::ui(ui, session)).inner
+        });
+        action = action.or(voted);
+        action = viewpoints::ui(ui, session).or(action);
+        let parts = theme::section_about(ui, "Components", components::ABOUT, |ui| {
+            components::ui(ui, session, blocked)
+        });
+        action = action.or(parts);
+    }
+    action
+}
+
+/// The kinds that there are, each with what can be done with all of it.
+fn kinds(ui: &mut Ui, session: &Session, blocked: Option<&str>) -> Option<Action> {
+    let mut action = None;
+    let present: Vec<SourceKind> = (SourceKind::ALL.into_iter())
+        .filter(|&kind| session.kinds.count(kind) > 0)
+        .collect();
+    for &kind in &present {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = SPACE_XS;
+            let mut shown = session.kinds.is_shown(kind);
+            let show = ui.checkbox(&mut shown, "");
+            let show = show.accessible_name(format!("Show {}", kind.label()));
+            if show.on_hover_text("Show in the view").changed() {
+                action = Some(Action::ShowKind(kind, shown));
+            }
+            let (place, _) = ui.allocate_exact_size(Vec2::new(2.0 * BALL + SPACE_XS, ROW_HEIGHT), egui::Sense::hover());
+            if let Some(color) = kind.color() {
+                ui.painter().circle_filled(place.center(), BALL, color);
+            } else if kind != SourceKind::Scanner {
+                // These are green or pink, by what they do.
+                let [kept, flipped] = [theme::SOURCE_KEPT, theme::SOURCE_FLIPPED].map(color_of);
+                ui.painter()
+                    .circle_filled(place.center() - Vec2::new(2.0, 0.0), BALL - 1.0, kept);
+                ui.painter()
+                    .circle_filled(place.center() + Vec2::new(3.0, 0.0), BALL - 1.0, flipped);
+            }
+            ui.label(kind.label()).on_hover_text(kind.about());
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let orients = matches!(kind, SourceKind::Voted | SourceKind::Scanner | SourceKind::File);
+                let drop = ui.add_enabled(!orients || blocked.is_none(), Button::new("Drop").small());
+                let drop = drop.accessible_name(format!("Drop {}", kind.label()));
+                let drop = drop.on_hover_text(kind.drop_tooltip());
+                if drop.on_disabled_hover_text(blocked.unwrap_or_default()).clicked() {
+                    action = Some(Action::DropKind(kind));
+                }
+                ui.label(RichText::new(theme::thousands(session.kinds.count(kind))).weak());
+            });
+        });
+    }
+    let is_own = |kind: &SourceKind| !matches!(kind, SourceKind::Voted | SourceKind::Scanner | SourceKind::File);
+    if !present.iter().any(is_own) {
+        let hint = "You made none yet. Click a wrong region in the view: it turns, and its point becomes a source.";
+        ui.add(egui::Label::new(RichText::new(hint).weak()).wrap());
+    }
+    action
+}
+
+fn color_of(color: [f32; 3]) -> Color32 {
+    let [r, g, b] = color.map(|channel| (channel * 255.0).round() as u8);
+    Color32::from_rgb(r, g, b)
+}
+
+/// The list and its buttons: select, flip, remove, fly to. Only the rows in sight are laid out.
+fn list(ui: &mut Ui, session: &mut Session) -> Option<Action> {
     let reveal = session.reveal.take();
     let session = &*session;
     let sources = session.document.sources();
-    let n_voted = session
-        .document
-        .propagation()
-        .map_or(0, |propagation| propagation.voted_sources.len());
-    if n_voted > 0 {
-        let voted = theme::counted(n_voted as u64, "source", "sources");
-        ui.label(RichText::new(format!("{voted} voted for by viewpoints")).weak())
-            .on_hover_text("Found by visibility. Those you make overrule them. Some are shown as yellow spheres.");
-    }
-    if sources.is_empty() {
-        let hint = "None yet. Click a wrong region in the view: it turns, and its point becomes a source.";
-        ui.add(egui::Label::new(RichText::new(hint).weak()).wrap());
-        return None;
-    }
     let mut action = None;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = SPACE_XS;
@@ -44,7 +110,7 @@ pub fn ui(ui: &mut Ui, session: &mut Session) -> Option<Action> {
                 "Remove"
             };
             let button = ui.add_enabled(n_selected > 0, Button::new(short));
-            let tooltip = format!("{} ({})", command.tooltip(), command.keys_text(ui.ctx()));
+            let tooltip = command.tooltip_with_keys(ui.ctx());
             if button
                 .on_hover_text(tooltip)
                 .on_disabled_hover_text("Select sources first")
@@ -99,20 +165,29 @@ pub fn ui(ui: &mut Ui, session: &mut Session) -> Option<Action> {
 
 fn row(ui: &mut Ui, point: u32, flipped: bool, origin: Origin, selected: bool) -> egui::Response {
     let state = if flipped { "flipped" } else { "kept" };
+    let by = match origin {
+        Origin::Rule(rule) => rule.label(),
+        origin => origin.label(),
+    };
     let text = format!("      Point {}", theme::thousands(u64::from(point)));
     let button = Button::selectable(selected, text)
-        .shortcut_text(format!("{state}, {}", origin.label().to_lowercase()))
+        .shortcut_text(format!("{state}, {}", by.to_lowercase()))
         .min_size(Vec2::new(ui.available_width(), ROW_HEIGHT));
-    let response = ui
-        .add(button)
-        .on_hover_text("Click to select, double-click to bring into view");
-    let [r, g, b] = if flipped {
+    let state = if flipped {
+        "It turned its point."
+    } else {
+        "It holds the side that its point has without sources."
+    };
+    let about = SourceKind::of(origin).about();
+    let response = ui.add(button).on_hover_text(format!(
+        "{state}\n{about}\nClick to select, double-click to bring into view."
+    ));
+    let color = color_of(if flipped {
         theme::SOURCE_FLIPPED
     } else {
         theme::SOURCE_KEPT
-    }
-    .map(|channel| (channel * 255.0).round() as u8);
+    });
     let center = response.rect.left_center() + Vec2::new(SPACE_S + 8.0, 0.0);
-    ui.painter().circle_filled(center, 5.0, Color32::from_rgb(r, g, b));
+    ui.painter().circle_filled(center, BALL, color);
     response
 }
