@@ -16,7 +16,7 @@ use normend_core::propagation::{ETA, VIEWS};
 use normend_core::shapes::ShapeKind;
 use normend_core::{EdgeRule, Estimator, Method, Parameters, Preset, SideRule, SourceRule, Start};
 use normend_io::{ReadError, Scan};
-use normend_render::{DisplayMode, StandardView};
+use normend_render::{DisplayMode, StandardView, UpAxis};
 
 use self::bench::BenchArguments;
 use self::replay::{RehearseArguments, ReplayArguments};
@@ -396,6 +396,10 @@ pub struct RenderArguments {
     /// Side to look from
     #[arg(long, value_name = "NAME", value_parser = one_of(&StandardView::ALL, StandardView::name), default_value = StandardView::Corner.name())]
     pub view: StandardView,
+
+    /// Axis that stands upright; sides are named after it
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true, value_parser = one_of(&UpAxis::ALL, UpAxis::name), default_value = UpAxis::default().name())]
+    pub up: UpAxis,
 
     /// Colors of front and back
     #[arg(long, value_name = "NAME", value_parser = one_of(&PaletteName::ALL, PaletteName::name), default_value = PaletteName::default().name())]

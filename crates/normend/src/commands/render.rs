@@ -17,6 +17,9 @@ use super::{Outcome, check_is_file_name, check_may_write, is_same_file, prepare,
 use crate::arguments::RenderArguments;
 use crate::console::Bar;
 
+/// Pixels of a picture's shorter side up to which its lines are one pixel wide.
+const SCREEN_SIDE: f32 = 1000.0;
+
 /// Width and height of a picture in pixels, typed as `1280x800`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PictureSize {
@@ -199,7 +202,8 @@ impl Graphics {
             .ok_or(EditError::NotReady)?;
         let (min, max) = cloud.bounding_box();
         let aspect = width as f32 / height as f32;
-        let mut camera = Camera::framing(min, max, arguments.view, aspect);
+        let mut camera = Camera::new(arguments.view, arguments.up);
+        camera.frame(min, max, aspect);
         camera.frame_points(cloud.positions().iter().copied(), aspect);
         let settings = DrawSettings {
             mode: arguments.mode,
@@ -210,7 +214,10 @@ impl Graphics {
         renderer.set_cloud(device, queue, cloud.positions(), Some(&normals), radii, None)?;
         renderer.set_colors(device, colors)?;
         let size = [width, height];
-        let maker = renderer.picture_maker(device, queue, &camera, size, 1.0, &settings, arguments.transparent);
+        // Edges are as wide on a large picture, seen as a whole, as on one that fits a screen.
+        let line_scale = (width.min(height) as f32 / SCREEN_SIDE).max(1.0);
+        let transparent = arguments.transparent;
+        let maker = renderer.picture_maker(device, queue, &camera, size, line_scale, &settings, transparent);
         let picture = maker.make(&mut |fraction| progress.report(fraction).is_ok());
         if let Some(failure) = self.failure.lock().unwrap_or_else(PoisonError::into_inner).take() {
             bail!("the graphics driver cannot draw this ({failure}): try a smaller --size");

@@ -6,6 +6,7 @@ use egui::{Align, Button, Color32, Layout, RichText, Shape, Stroke, Ui, Vec2};
 use normend_render::Palette;
 
 use crate::command::{Action, Command};
+use crate::dialogs::NO_DROP;
 use crate::theme::{self, SPACE_L, SPACE_M, SPACE_S, SPACE_XS};
 
 const WIDTH: f32 = 460.0;
@@ -55,9 +56,9 @@ pub fn ui(ui: &mut Ui, recent: &[PathBuf], can_drop: bool) -> Option<Action> {
             });
             ui.add_space(SPACE_XS);
             let formats = if can_drop {
-                "PLY and XYZ text. You can also drop a file on this window."
+                "PLY and XYZ text. You can also drop a file on this window.".to_owned()
             } else {
-                "PLY and XYZ text."
+                format!("PLY and XYZ text. {NO_DROP}")
             };
             ui.label(RichText::new(formats).weak());
             if recent.is_empty() {

@@ -5,6 +5,7 @@ use glam::Vec3;
 
 use super::overlay::{HALO, LINE};
 use super::{SceneBounds, Viewport};
+use crate::theme;
 
 /// Radius of a handle, in points.
 const RADIUS: f32 = 7.0;
@@ -263,7 +264,7 @@ impl Viewport {
                 let is_of_lit =
                     lit.is_some_and(|face| face.axis != axis && (bits >> face.axis & 1 == 1) == face.is_high);
                 let (width, color) = if is_of_lit {
-                    (2.5, Color32::WHITE)
+                    (2.5, theme::accent(ui))
                 } else {
                     (1.0, Color32::from_white_alpha(190))
                 };

@@ -32,7 +32,7 @@ impl Viewport {
         let mut bottom = self.rect.bottom() - SPACE_S;
         if let Some(fly) = &self.fly {
             let text = format!(
-                "Flying at speed {:.2} · W A S D move · E Q rise and sink · Shift: faster · drag: look · wheel: speed · Esc: end",
+                "Flying at speed {:.2} · W A S D E Q move · Shift hurries · drag looks · wheel: speed · Esc ends",
                 fly.speed()
             );
             bottom = self.notice(ui, bottom, &text);
