@@ -49,9 +49,12 @@ pub mod document;
 
 pub mod metrics;
 
+pub mod live_comparison;
+
 pub mod shapes;
 
 pub use document::{Document, Edit, EditError, EditKind, Mark, StateChange};
+pub use live_comparison::LiveComparison;
 pub use neighbors::Neighbors;
 pub use normals::Estimator;
 pub use orientation::{Change, Orientation};

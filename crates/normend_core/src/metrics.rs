@@ -137,7 +137,7 @@ fn root_of(parents: &mut [u32], mut point: u32) -> u32 {
 }
 
 /// How the normal of one point compares with its reference.
-struct Verdict {
+pub(crate) struct Verdict {
     judged: bool,
     undefined: bool,
     dot: f64,
@@ -146,7 +146,7 @@ struct Verdict {
 }
 
 impl Verdict {
-    fn of(reference: Vec3, normal: Vec3) -> Self {
+    pub(crate) fn of(reference: Vec3, normal: Vec3) -> Self {
         let (reference, normal) = (reference.as_dvec3(), normal.as_dvec3());
         let judged = reference.is_finite() && reference.length() > SHORTEST_REFERENCE;
         let undefined = !normal.is_finite() || normal.length() < SHORTEST_NORMAL;
@@ -167,17 +167,26 @@ impl Verdict {
         }
     }
 
-    fn wrong(&self) -> bool {
+    /// Whether the reference says anything.
+    pub(crate) fn judged(&self) -> bool {
+        self.judged
+    }
+
+    pub(crate) fn wrong(&self) -> bool {
         self.judged && (self.undefined || self.dot < 0.0)
     }
 
-    fn wrong_when_flipped(&self) -> bool {
+    pub(crate) fn wrong_when_flipped(&self) -> bool {
         self.judged && (self.undefined || self.dot > 0.0)
     }
 }
 
 /// The components of the symmetric graph, as the trees of a spanning forest.
-fn components(cloud: &PointCloud, neighbors: &Neighbors, progress: &dyn Progress) -> Result<SpanningTree, Cancelled> {
+pub(crate) fn components(
+    cloud: &PointCloud,
+    neighbors: &Neighbors,
+    progress: &dyn Progress,
+) -> Result<SpanningTree, Cancelled> {
     // Only connection counts: with equal normals all weights are 0.
     let normals = vec![Vec3::Z; cloud.n_points()];
     let graph = RiemannianGraph::new(
