@@ -6,6 +6,7 @@ use egui::{Button, Ui};
 
 use super::Availability;
 use crate::command::{Action, Command, Menu};
+use crate::dialogs;
 use crate::theme::{self, SPACE_S, SPACE_XS};
 
 /// The menu bar. `recent` are the scans opened last.
@@ -74,10 +75,16 @@ fn recent_menu(ui: &mut Ui, recent: &[PathBuf]) -> Option<Action> {
     action
 }
 
-/// The toolbar: the commands used most. `undo` and `redo` name the edits that would be undone and redone.
-pub fn toolbar(ui: &mut Ui, availability: &Availability<'_>, undo: Option<&str>, redo: Option<&str>) -> Option<Action> {
+/// The toolbar: the commands used most. `undo` and `redo` name the edits that would be undone and redone; `tools` adds the tools.
+pub fn toolbar(
+    ui: &mut Ui,
+    availability: &Availability<'_>,
+    undo: Option<&str>,
+    redo: Option<&str>,
+    tools: impl FnOnce(&mut Ui) -> Option<Action>,
+) -> Option<Action> {
     let mut action = None;
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = SPACE_XS;
         for (index, (command, of)) in [
             (Command::Open, None),
@@ -97,6 +104,9 @@ pub fn toolbar(ui: &mut Ui, availability: &Availability<'_>, undo: Option<&str>,
             if let Some(edit) = of {
                 tooltip = format!("{edit}: {tooltip}");
             }
+            if command == Command::Open && !dialogs::can_drop() {
+                tooltip = format!("{tooltip}. {}", dialogs::NO_DROP);
+            }
             let clicked = match available {
                 Ok(()) => response.on_hover_text(tooltip).clicked(),
                 Err(reason) => response.on_disabled_hover_text(reason).clicked(),
@@ -105,6 +115,8 @@ pub fn toolbar(ui: &mut Ui, availability: &Availability<'_>, undo: Option<&str>,
                 action = Some(command.into());
             }
         }
+        divider(ui);
+        action = tools(ui).or(action.take());
     });
     action
 }

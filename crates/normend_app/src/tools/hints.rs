@@ -52,17 +52,76 @@ impl Tool {
     pub fn hints(self) -> &'static [Hint] {
         match self {
             Self::Mend => MEND,
+            Self::Brush => BRUSH,
+            Self::Lasso => LASSO,
+            Self::Rectangle => RECTANGLE,
+            Self::Polygon => POLYGON,
+            Self::Patch => PATCH,
+            Self::Component => COMPONENT,
         }
     }
 }
 
+const COMBINE: Hint = Hint::pointer("Shift adds, Ctrl removes, both intersect", "with what is selected");
+const THROUGH: Hint = Hint::keys(Command::VisibleOnly, "Visible only, or through");
+const ORBIT: Hint = Hint::pointer("Right drag or Alt+drag", "Orbit");
+const PAN: Hint = Hint::pointer("Middle or Shift+right drag", "Pan");
+const RESIZE: Hint = Hint::pointer("Press, turn the wheel, release", "Larger or smaller patch");
+const MENU: Hint = Hint::pointer("Right click", "What can be done here");
+
 const MEND: &[Hint] = &[
     Hint::pointer("Click", "Mend here"),
-    Hint::pointer("Press, turn the wheel, release", "Larger or smaller patch"),
+    RESIZE,
     Hint::pointer("Ctrl+click", "Turn whole region here"),
     Hint::pointer("Alt+click", "Mend along the tree here"),
     Hint::pointer("Click a sphere (Shift adds)", "Select a source"),
+    MENU,
 ];
+
+const BRUSH: &[Hint] = &[
+    Hint::pointer("Drag", "Select under the brush"),
+    COMBINE,
+    Hint::pointer("Alt+wheel", "Brush size"),
+    Hint::keys(Command::LargerPatch, "Larger brush"),
+    Hint::keys(Command::SmallerPatch, "Smaller brush"),
+    THROUGH,
+    ORBIT,
+    PAN,
+    MENU,
+];
+
+const LASSO: &[Hint] = &[
+    Hint::pointer("Drag around", "Select within the line"),
+    COMBINE,
+    THROUGH,
+    ORBIT,
+    PAN,
+    MENU,
+];
+
+const RECTANGLE: &[Hint] = &[
+    Hint::pointer("Drag from corner to corner", "Select within the rectangle"),
+    COMBINE,
+    THROUGH,
+    ORBIT,
+    PAN,
+    MENU,
+];
+
+const POLYGON: &[Hint] = &[
+    Hint::pointer("Click corners", "Select within the polygon"),
+    Hint::pointer("Double-click, the first corner, or Enter", "Close"),
+    Hint::pointer("Backspace", "Take a corner back"),
+    COMBINE,
+    THROUGH,
+    ORBIT,
+    PAN,
+    MENU,
+];
+
+const PATCH: &[Hint] = &[Hint::pointer("Click", "Select the patch"), RESIZE, COMBINE, MENU];
+
+const COMPONENT: &[Hint] = &[Hint::pointer("Click", "Select the component"), COMBINE, MENU];
 
 #[cfg(test)]
 mod tests {

@@ -2,6 +2,9 @@
 
 use egui::{Event, Modifiers, PointerButton, Pos2, Rect, Ui};
 
+use normend_core::document::Viewer;
+use normend_render::Projection;
+
 use super::Viewport;
 
 /// What the main button does while a tool draws, in the order it happened; places in points of the window.
@@ -52,6 +55,14 @@ impl Viewport {
             rect: self.rect,
             size: self.size,
             pixels_per_point: self.pixels_per_point,
+        }
+    }
+
+    /// From where the picture is seen, in the cloud's own space.
+    pub fn viewer(&self) -> Viewer {
+        match self.camera.projection {
+            Projection::Perspective => Viewer::At(self.camera.eye()),
+            Projection::Orthographic => Viewer::Toward(self.camera.back()),
         }
     }
 

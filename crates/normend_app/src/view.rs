@@ -1,0 +1,217 @@
+//! The 3D view in a frame: what the pointer does becomes clicks, strokes and menus, and those become edits.
+
+use egui::{CursorIcon, Ui};
+use normend_core::{Document, Edit};
+use normend_render::DrawSettings;
+
+use crate::app::App;
+use crate::command::{Action, Command};
+use crate::panels::{context_menu, split_line};
+use crate::scene_sync::Target;
+use crate::theme;
+use crate::tools::point_tool::Means;
+use crate::tools::{Combine, Tool, ToolEvent};
+use crate::viewport::{Pixel, PointerOnView};
+
+impl App {
+    pub(crate) fn view(&mut self, ui: &mut Ui, draw_settings: &mut DrawSettings) -> Option<Action> {
+        let Some(scene) = &mut self.scene else {
+            ui.centered_and_justified(|ui| ui.label("There is no graphics adapter to show the scan."));
+            return None;
+        };
+        let under_pointer = self.point_tool.target().map(|target| target.position());
+        let preferences = &self.settings.settings;
+        self.viewport
+            .set_preferences(preferences.navigation, preferences.reduce_motion);
+        self.viewport.set_draws(self.tool.paints());
+        let width = self.viewport.size_in_pixels().x;
+        draw_settings.compare = self.comparing.compare(width);
+        draw_settings.hair = self.settings.settings.display.hair(ui.pixels_per_point());
+        let mut pointer = self.viewport.ui(ui, scene, draw_settings, under_pointer);
+        split_line::ui(ui, self.viewport.rect, &mut self.comparing);
+        self.settings.settings.splat_scale = draw_settings.splat_scale.clamp(
+            *crate::settings::SPLAT_SCALES.start(),
+            *crate::settings::SPLAT_SCALES.end(),
+        );
+        let action = self.menu(&mut pointer);
+        self.point_tool.step(pointer.steps);
+        self.draw(&pointer);
+        let (Some(scene), Some(session)) = (&self.scene, &self.session) else {
+            return action;
+        };
+        let document = &session.document;
+        let means = Means::of(self.tool, pointer.modifiers);
+        let asked = match (pointer.clicked.zip(means), pointer.pivot) {
+            (_, Some(pixel)) => self.point_tool.pivot(scene, document, pixel),
+            (Some((pixel, means)), None) => self.point_tool.click(scene, document, pixel, means, pointer.modifiers),
+            (None, None) => None,
+        };
+        if pointer.by_double_click {
+            self.take_back_click();
+        }
+        self.handle(asked);
+        let (Some(scene), Some(session)) = (&mut self.scene, &self.session) else {
+            return action;
+        };
+        let hovered = pointer.hovered;
+        if self.proposal.is_some() {
+            // What is proposed is highlighted, and nothing else.
+            pointer.hovered = None;
+        }
+        let answered = self.point_tool.update(scene, session, &pointer, self.tool);
+        self.handle(answered);
+        self.hovered = hovered;
+        self.take_answers();
+        if self.point_tool.is_picking() {
+            ui.request_repaint();
+        }
+        self.paint_pointer(ui, &pointer);
+        action
+    }
+
+    /// Follows the main button for the tools that draw.
+    fn draw(&mut self, pointer: &PointerOnView) {
+        self.size_brush(pointer.sizing);
+        let view = self.viewport.view_place();
+        let strokes = self
+            .painting
+            .follow(self.tool, self.brush_radius, &pointer.drawn, &view);
+        for stroke in strokes {
+            self.take_stroke(stroke);
+        }
+    }
+
+    /// What the pointer draws, and words beside it.
+    fn paint_pointer(&self, ui: &Ui, pointer: &PointerOnView) {
+        let view = self.viewport.view_place();
+        if self.tool.paints() {
+            self.painting
+                .paint(ui, &view, self.tool, self.brush_radius, pointer.position);
+            if pointer.position.is_some() && !ui.input(|input| input.pointer.secondary_down()) {
+                ui.set_cursor_icon(CursorIcon::Crosshair);
+            }
+        }
+        if let (Some(position), Some(text)) = (pointer.position, self.badge_text(pointer)) {
+            self.viewport.badge(ui, position, &text);
+        }
+    }
+
+    /// The menu of a right click.
+    fn menu(&mut self, pointer: &mut PointerOnView) -> Option<Action> {
+        let response = pointer.response.as_ref()?;
+        if response.secondary_clicked()
+            && let Some(position) = response.interact_pointer_pos()
+        {
+            self.menu_pixel = self.viewport.pixel(position);
+        }
+        let pixel = self.menu_pixel?;
+        let mut action = None;
+        let shown = egui::Popup::context_menu(response).show(|ui| {
+            let target = self
+                .scene
+                .as_ref()
+                .and_then(|scene| self.point_tool.target_at(scene, pixel));
+            action = context_menu::ui(ui, pixel, target, &|command| self.availability(command));
+        });
+        if shown.is_none() {
+            self.menu_pixel = None;
+        } else if let Some(scene) = &self.scene {
+            // What the menu is about stays what is known.
+            pointer.hovered = Some(pixel);
+            if self.point_tool.target_at(scene, pixel).is_none() {
+                self.point_tool.look(scene, pixel);
+            }
+        }
+        action
+    }
+
+    /// What a click or a stroke at the pointer would do.
+    fn badge_text(&self, pointer: &PointerOnView) -> Option<String> {
+        if self.selecting.is_busy() {
+            return Some("Selecting…".to_owned());
+        }
+        let of_source = || {
+            let session = self.session.as_ref()?;
+            let Some(Target::Source { point, .. }) = self.point_tool.target() else {
+                return None;
+            };
+            let source = session.document.sources().get(point)?;
+            let state = if session.document.is_flipped(source) {
+                "flipped"
+            } else {
+                "kept"
+            };
+            Some(format!(
+                "Source at point {}, {state}",
+                theme::thousands(u64::from(point))
+            ))
+        };
+        match self.tool {
+            Tool::Mend => self.point_tool.badge().or_else(of_source),
+            Tool::Patch | Tool::Component => {
+                let sign = Combine::of(pointer.modifiers).sign();
+                let text = self.point_tool.badge().unwrap_or_else(|| self.tool.label().to_owned());
+                Some(format!("{sign} {text}").trim_start().to_owned())
+            }
+            Tool::Brush | Tool::Lasso | Tool::Rectangle | Tool::Polygon => {
+                let combine = self.painting.combine().unwrap_or(Combine::of(pointer.modifiers));
+                let through = if self.visible_only { "" } else { ", through" };
+                let text = format!("{} {}{through}", combine.sign(), self.tool.label());
+                Some(text.trim_start().to_owned())
+            }
+        }
+    }
+
+    /// The first click of a double-click did something; the user meant the pivot.
+    fn take_back_click(&mut self) {
+        let revision = self.document().map(Document::revision);
+        if self
+            .clicked_revision
+            .take()
+            .is_some_and(|clicked| Some(clicked) == revision)
+        {
+            self.act(Command::Undo.into());
+        }
+    }
+
+    pub(crate) fn handle(&mut self, event: Option<ToolEvent>) {
+        match event {
+            None => {}
+            Some(ToolEvent::Edit(edit)) => self.apply_click(edit),
+            Some(ToolEvent::Select { points, combine }) => {
+                self.select_points(points, combine);
+                self.clicked_revision = self.document().map(Document::revision);
+            }
+            Some(ToolEvent::SelectSource { point, extend }) => self.act(Action::SelectSource { point, extend }),
+            Some(ToolEvent::Deselect) => self.deselect(),
+            Some(ToolEvent::Pivot(point)) => self.viewport.set_pivot(point),
+        }
+    }
+
+    fn apply_click(&mut self, edit: Edit) {
+        self.apply_edit(edit);
+        self.clicked_revision = self.document().map(Document::revision);
+    }
+
+    /// The pixel that keyboard commands mean: under the pointer, else the middle of the view.
+    pub(crate) fn meant_pixel(&self) -> Pixel {
+        self.hovered.unwrap_or_else(|| self.viewport.center())
+    }
+
+    /// A click at a pixel, for what `means` says.
+    pub(crate) fn click_at(&mut self, pixel: Pixel, means: Means) {
+        if let (Some(scene), Some(session)) = (&self.scene, &self.session) {
+            let modifiers = egui::Modifiers::NONE;
+            let event = self.point_tool.click(scene, &session.document, pixel, means, modifiers);
+            self.handle(event);
+        }
+    }
+
+    /// Turns the view around what is at a pixel.
+    pub(crate) fn pivot_at(&mut self, pixel: Pixel) {
+        if let (Some(scene), Some(session)) = (&self.scene, &self.session) {
+            let event = self.point_tool.pivot(scene, &session.document, pixel);
+            self.handle(event);
+        }
+    }
+}
