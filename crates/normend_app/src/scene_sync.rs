@@ -3,20 +3,21 @@
 //! The splats are uploaded in the tree's preorder, so an instance of the renderer is a position of the tree and the
 //! ranges of a [`Change`] are the ranges that the renderer turns. Source spheres follow the document's sources.
 
-use std::collections::BTreeSet;
+use std::ops::Range;
 use std::sync::Arc;
 
 use eframe::egui_wgpu::RenderState;
 use egui::TextureId;
+use fixedbitset::FixedBitSet;
 use glam::Vec3;
-use normend_core::{Change, PointCloud, Propagation, SpanningTree};
+use normend_core::{Change, PointCloud, PointSet, Propagation, SpanningTree};
 use normend_render::{
-    Camera, Clip, CloudUploader, DrawSettings, Hit, PickRequest, RenderError, Sphere, SplatRenderer, UploadedCloud,
-    wgpu,
+    Camera, Clip, CloudUploader, Compare, DrawSettings, Hair, HairLen, Hit, IdsRequest, Lens, PickRequest,
+    PictureMaker, RenderError, SeenIds, SplatRenderer, UploadedCloud, UploadedColors, wgpu,
 };
 
 use crate::session::Session;
-use crate::theme;
+use crate::source_spheres::SourceSpheres;
 
 /// What is under the pointer, in the document's words.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,6 +69,8 @@ pub struct Scene {
     source_points: Vec<u32>,
     /// How many of them are sources of the document.
     n_own_sources: usize,
+    /// What is highlighted while nothing else is.
+    outlined: Option<Change>,
     geometry: Option<Geometry>,
     /// Side of the squares of screen pixels that the last picture has one pixel for.
     pixel_side: u32,
@@ -87,6 +90,7 @@ impl Scene {
             tree: None,
             source_points: Vec::new(),
             n_own_sources: 0,
+            outlined: None,
             geometry: None,
             pixel_side: 1,
             picture_id: 0,
@@ -130,7 +134,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`RenderError`] when the graphics adapter cannot hold it.
-    pub fn show_document(&mut self, session: &Session, uploaded: Option<UploadedCloud>) -> Result<(), RenderError> {
+    pub fn show_document(&mut self, session: &mut Session, uploaded: Option<UploadedCloud>) -> Result<(), RenderError> {
         let document = &session.document;
         let (Some(propagation), Some(orientation)) = (document.propagation(), document.orientation()) else {
             return Ok(());
@@ -143,64 +147,173 @@ impl Scene {
         self.renderer.show_cloud(device, queue, uploaded);
         self.tree = Some(tree);
         self.renderer.set_turned(queue, &orientation.to_words());
+        session.take_toggled();
+        self.show_sets(session);
         self.show_sources(session);
         Ok(())
     }
 
     /// Shows what an edit, an undo or a redo turned, and the sources after it.
-    pub fn apply(&mut self, change: &Change, session: &Session) {
+    pub fn apply(&mut self, change: &Change, session: &mut Session) {
         self.renderer.turn(&self.state.queue, change.ranges());
+        match session.take_toggled() {
+            Some([selected, hidden]) => {
+                let queue = &self.state.queue;
+                self.renderer.select(queue, &self.ranges_of(&selected));
+                self.renderer.hide(queue, &self.ranges_of(&hidden));
+                if !hidden.is_empty() {
+                    // What was behind is seen now: earlier picks no longer hold.
+                    self.picture_id += 1;
+                    self.ids_version += 1;
+                }
+            }
+            None => self.show_sets(session),
+        }
         self.show_sources(session);
     }
 
-    /// Highlights what a click would turn, or nothing.
+    /// Shows what is selected and hidden from scratch. O(n / 32) and what is selected and hidden.
+    fn show_sets(&mut self, session: &Session) {
+        let document = &session.document;
+        let n_words = document.cloud().n_points().div_ceil(32);
+        let [selected, hidden] = [document.selected(), document.hidden()].map(|set| {
+            let mut words = vec![0_u32; n_words];
+            for point in set {
+                let instance = self.instance(point);
+                if let Some(word) = words.get_mut(instance as usize / 32) {
+                    *word |= 1 << (instance % 32);
+                }
+            }
+            words
+        });
+        self.renderer.set_selected(&self.state.queue, &selected);
+        self.renderer.set_hidden(&self.state.queue, &hidden);
+        self.picture_id += 1;
+        self.ids_version += 1;
+    }
+
+    fn instance(&self, point: u32) -> u32 {
+        self.tree.as_ref().map_or(point, |tree| tree.position(point))
+    }
+
+    /// The instances of points, as ranges. O(points · log points).
+    fn ranges_of(&self, points: &PointSet) -> Vec<Range<u32>> {
+        let mut instances: Vec<u32> = points.iter().map(|point| self.instance(point)).collect();
+        instances.sort_unstable();
+        let runs = instances.chunk_by(|&a, &b| a + 1 == b);
+        runs.map(|run| run[0]..run[run.len() - 1] + 1).collect()
+    }
+
+    /// The points of instances.
+    pub fn points_of(&self, instances: &[u32]) -> PointSet {
+        let Some(tree) = &self.tree else {
+            return instances.iter().copied().collect();
+        };
+        let order = tree.order();
+        let mut points: Vec<u32> = instances
+            .iter()
+            .filter_map(|&instance| order.get(instance as usize).copied())
+            .collect();
+        points.sort_unstable();
+        points.into_iter().collect()
+    }
+
+    /// Asks which instances the last picture shows in a rectangle of the view, in physical pixels. `None` while the picture is
+    /// older than the ids or not in full detail, which the next ones will be.
+    pub fn read_ids(&self, min: [u32; 2], size: [u32; 2]) -> Option<IdsRequest> {
+        let is_full = self.pixel_side == 1 && self.geometry.is_some_and(|geometry| geometry.stride <= 1);
+        if self.drawn_ids_version != self.ids_version || !is_full {
+            return None;
+        }
+        self.renderer.read_ids(&self.state.device, &self.state.queue, min, size)
+    }
+
+    /// The point at each pixel of the last picture: width, height, and rows from the top. Blocks; for tests.
+    pub fn read_points(&self) -> Option<([u32; 2], Vec<Option<u32>>)> {
+        let ([width, height], _) = self.read_picture()?;
+        let seen = self.read_ids([0, 0], [width, height])?.wait(&self.state.device);
+        let point = |&instance: &u32| match &self.tree {
+            Some(tree) => tree.order().get(instance as usize).copied(),
+            None => Some(instance).filter(|&instance| instance != SeenIds::NONE),
+        };
+        Some((seen.size, seen.instances.iter().map(point).collect()))
+    }
+
+    /// The answer of [`Self::read_ids`]: `None` while under way. Never blocks.
+    pub fn poll_ids(&self, request: &mut IdsRequest) -> Option<SeenIds> {
+        request.poll(&self.state.device)
+    }
+
+    /// Where places are in the last picture; `None` before the first.
+    pub fn lens(&self) -> Option<Lens> {
+        // In full detail: while the camera moves a pixel of the picture may stand for several of the screen.
+        self.renderer.lens().filter(|_| self.pixel_side == 1)
+    }
+
+    /// Bytes uploaded to the graphics adapter so far.
+    pub fn bytes_uploaded(&self) -> u64 {
+        self.renderer.bytes_uploaded()
+    }
+
+    /// Keeps these positions highlighted while nothing else is, or none.
+    pub fn outline(&mut self, change: Option<Change>) {
+        self.outlined = change;
+        self.highlight(None);
+    }
+
+    /// What draws a picture beside the window's; see [`SplatRenderer::picture_maker`].
+    pub fn picture_maker(
+        &self,
+        camera: &Camera,
+        size: [u32; 2],
+        pixels_per_point: f32,
+        settings: &DrawSettings,
+    ) -> PictureMaker {
+        let (device, queue) = (&self.state.device, &self.state.queue);
+        self.renderer
+            .picture_maker(device, queue, camera, size, pixels_per_point, settings)
+    }
+
+    /// Shows colors that a job uploaded: by position, or by point before points are oriented.
+    ///
+    /// # Errors
+    /// As [`SplatRenderer::show_colors`].
+    pub fn show_colors(&mut self, colors: Option<UploadedColors>) -> Result<(), RenderError> {
+        self.renderer.show_colors(colors)
+    }
+
+    /// Colors the positions from `first` on.
+    pub fn update_colors(&mut self, first: u32, colors: &[u32]) {
+        self.renderer.update_colors(&self.state.queue, first, colors);
+    }
+
+    /// The signs to compare with: a bit a position, in words of 32.
+    pub fn set_compared(&mut self, words: &[u32]) {
+        self.renderer.set_compared(&self.state.queue, Some(words));
+    }
+
+    /// Marks these positions as wrong, and no others. O(n / 64).
+    pub fn set_wrong(&mut self, wrong: &FixedBitSet) {
+        let words = normend_core::Orientation::new(wrong.clone()).to_words();
+        self.renderer.set_wrong(&self.state.queue, &words);
+    }
+
+    /// Marks these positions as wrong, or those of them that are marked as right.
+    pub fn mark_wrong(&mut self, toggled: &Change) {
+        self.renderer.mark_wrong(&self.state.queue, toggled.ranges());
+    }
+
+    /// Highlights what a click would turn, or what is outlined.
     pub fn highlight(&mut self, change: Option<&Change>) {
-        let ranges = change.map_or(&[][..], Change::ranges);
+        let ranges = change.or(self.outlined.as_ref()).map_or(&[][..], Change::ranges);
         self.renderer
             .set_highlight(&self.state.device, &self.state.queue, ranges);
     }
 
-    /// Shows the sources as spheres: green where they keep the side that was there, pink where they flipped it; and of those that
-    /// were voted for some, evenly picked, so that thousands neither hide the scan nor slow it down.
+    /// Shows sources and what else says a side as spheres; see [`SourceSpheres`].
     pub fn show_sources(&mut self, session: &Session) {
-        let positions = session.document.cloud().positions();
-        let selected: &BTreeSet<u32> = &session.selected;
-        let sources = session.document.sources();
-        let own = sources.iter().filter_map(|source| {
-            let color = if session.document.is_flipped(source) {
-                theme::SOURCE_FLIPPED
-            } else {
-                theme::SOURCE_KEPT
-            };
-            let center = *positions.get(source.point as usize)?;
-            Some((
-                source.point,
-                Sphere {
-                    center,
-                    color,
-                    selected: selected.contains(&source.point),
-                },
-            ))
-        });
-        let voted = session
-            .document
-            .propagation()
-            .map_or(&[][..], |propagation| propagation.voted_sources.as_slice());
-        let some_voted = voted
-            .iter()
-            .step_by(voted.len().div_ceil(MAX_VOTED_SPHERES).max(1))
-            .filter(|source| !sources.contains(source.point))
-            .filter_map(|source| {
-                let center = *positions.get(source.point as usize)?;
-                let sphere = Sphere {
-                    center,
-                    color: theme::SOURCE_VOTED,
-                    selected: false,
-                };
-                Some((source.point, sphere))
-            });
-        let (points, spheres): (Vec<u32>, Vec<Sphere>) = own.chain(some_voted).unzip();
-        self.n_own_sources = sources.len();
+        let SourceSpheres { points, spheres, n_own } = SourceSpheres::of(session);
+        self.n_own_sources = n_own;
         if points != self.source_points {
             // Spheres cover other pixels now: earlier picks no longer hold.
             self.source_points = points;
@@ -212,6 +325,7 @@ impl Scene {
     }
 
     fn forget_ids(&mut self) {
+        self.outlined = None;
         self.tree = None;
         self.source_points.clear();
         self.picture_id += 1;
@@ -243,13 +357,24 @@ impl Scene {
             self.geometry = Some(geometry);
             self.picture_id += 1;
         }
+        let mut settings = *settings;
+        if let Compare::Split(x) = &mut settings.compare {
+            *x /= pixel_side as f32;
+        }
+        if let Some(Hair {
+            len: HairLen::Pixels(len),
+            ..
+        }) = &mut settings.hair
+        {
+            *len /= pixel_side as f32;
+        }
         self.renderer.draw(
             &self.state.device,
             &self.state.queue,
             camera,
             size,
             pixels_per_point,
-            settings,
+            &settings,
         );
         self.drawn_ids_version = self.ids_version;
         let (view, version) = self.renderer.picture()?;
@@ -326,9 +451,6 @@ impl Scene {
         self.renderer.read_picture(&self.state.device, &self.state.queue)
     }
 }
-
-/// Most spheres of voted sources: enough to see where they are.
-const MAX_VOTED_SPHERES: usize = 500;
 
 /// Uploads points that were just read, for [`Scene::show_points`]. O(n); in any thread.
 ///

@@ -39,6 +39,13 @@ impl PictureMaker {
         self
     }
 
+    /// The same picture without its background, which is then clear, or with it, as at first.
+    #[must_use]
+    pub fn with_transparency(mut self, transparent: bool) -> Self {
+        self.shot.transparent = transparent;
+        self
+    }
+
     /// The same picture with other `ranges` of instances highlighted (ascending, disjoint), whatever the window
     /// highlights. Uploads 8 bytes a range.
     #[must_use]

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use egui::{Button, Id, Key, Modifiers, RichText, ScrollArea, TextEdit, Ui, Vec2};
-use normend_render::DisplayMode;
 
 use super::{Availability, modal};
+use crate::coloring::Coloring;
 use crate::command::{Action, Command};
 use crate::theme::{self, SPACE_S, SPACE_XS};
 
@@ -42,7 +42,7 @@ pub struct Offers<'a> {
     /// Scans opened last, newest first.
     pub recent_scans: &'a [PathBuf],
     /// The way of coloring in force; `None` when no scan is open.
-    pub mode: Option<DisplayMode>,
+    pub mode: Option<Coloring>,
 }
 
 struct Entry {
@@ -167,12 +167,12 @@ fn entries(ctx: &egui::Context, offers: &Offers<'_>) -> Vec<Entry> {
             blocked: (offers.availability)(command).err(),
         });
     let modes = offers.mode.into_iter().flat_map(|present| {
-        DisplayMode::ALL
+        Coloring::ALL
             .into_iter()
             .filter(move |&mode| mode != present)
             .map(|mode| Entry {
                 title: format!("Display: {}", mode.label()),
-                details: "Color the splats this way".to_owned(),
+                details: mode.tooltip().to_owned(),
                 keys: String::new(),
                 action: Action::Display(mode),
                 blocked: None,
@@ -260,7 +260,7 @@ mod tests {
             availability: &|command| if command == Command::Undo { Err("no") } else { Ok(()) },
             recent_commands: &recent,
             recent_scans: &scans,
-            mode: Some(DisplayMode::Facing),
+            mode: Some(Coloring::Facing),
         };
         let entries = entries(&egui::Context::default(), &offers);
         found(text, entries, &recent)
@@ -288,7 +288,7 @@ mod tests {
         let all = titles("", &["About", "FrameAll"]);
         assert_eq!(all[..2], ["About Normend".to_owned(), "Frame all".to_owned()]);
         // All commands but the palette itself, the other ways of coloring, and the scan.
-        assert_eq!(all.len(), Command::ALL.len() - 1 + DisplayMode::ALL.len() - 1 + 1);
+        assert_eq!(all.len(), Command::ALL.len() - 1 + Coloring::ALL.len() - 1 + 1);
         assert_eq!(all.last().unwrap(), "Undo", "what cannot be done comes last");
     }
 }

@@ -2,6 +2,7 @@
 
 use egui::text::{LayoutJob, TextFormat};
 use egui::{Align, Layout, RichText, Ui};
+use normend_core::LiveComparison;
 
 use crate::command::Command;
 use crate::session::Session;
@@ -15,6 +16,7 @@ pub fn ui(
     n_would_turn: Option<u64>,
     level: Option<(usize, usize)>,
     tool: Option<Tool>,
+    judged: Option<&LiveComparison>,
     adapter: &str,
 ) {
     if let Some(tool) = tool {
@@ -29,6 +31,24 @@ pub fn ui(
                         ui.label(RichText::new("·").weak());
                     }
                     ui.label(fact);
+                }
+                if session.n_interactions > 0 {
+                    ui.label(RichText::new("·").weak());
+                    ui.label(theme::counted(session.n_interactions, "interaction", "interactions"))
+                        .on_hover_text("Clicks, strokes and other edits so far, those that were taken back too");
+                }
+                if let Some(judged) = judged {
+                    ui.label(RichText::new("·").weak());
+                    let color = if judged.n_wrong() == 0 {
+                        ui.visuals().text_color()
+                    } else {
+                        ui.visuals().warn_fg_color
+                    };
+                    let text = theme::counted(judged.n_wrong(), "wrong point", "wrong points");
+                    ui.label(RichText::new(text).color(color)).on_hover_text(format!(
+                        "Against the reference; {} when each component is flipped to its better side",
+                        theme::thousands(judged.n_wrong_component_flip())
+                    ));
                 }
                 let n_undecided = session.n_undecided();
                 if n_undecided > 0 {

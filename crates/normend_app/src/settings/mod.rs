@@ -1,5 +1,6 @@
 //! What the editor remembers between runs: the values. [`store`](SettingsStore) keeps them in a file.
 
+mod display;
 mod store;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::command::Keymap;
 use crate::panels::side::SideTab;
 use crate::viewport::NavigationSettings;
+pub use display::{DisplaySettings, HAIR_LENGTHS, HAIR_STEPS};
 pub use store::SettingsStore;
 
 /// Of the file. 1 had the window's size and the folders in fields of their own.
@@ -142,6 +144,8 @@ pub struct Settings {
     pub palette: PaletteChoice,
     /// Factor on splat radii.
     pub splat_scale: f32,
+    /// How the scan is shown, apart from its coloring.
+    pub display: DisplaySettings,
     /// Factor on text and widgets.
     pub ui_scale: f32,
     /// Things jump instead of gliding.
@@ -173,6 +177,7 @@ impl Default for Settings {
             theme: ThemeChoice::default(),
             palette: PaletteChoice::default(),
             splat_scale: 1.0,
+            display: DisplaySettings::default(),
             ui_scale: 1.0,
             reduce_motion: false,
             navigation: NavigationSettings::default(),
@@ -225,6 +230,7 @@ impl Settings {
             *value = sane.clamp(*bounds.start(), *bounds.end());
         };
         tame(&mut self.splat_scale, SPLAT_SCALES, default.splat_scale);
+        self.display = self.display.into_sane();
         tame(&mut self.ui_scale, UI_SCALES, default.ui_scale);
         if !self.window.size.iter().all(|side| WINDOW_SIDES.contains(side)) {
             self.window.size = default.window.size;
