@@ -183,7 +183,8 @@ impl CloudSlices<'_> {
 const EMPTY_BOX: (Vec3, Vec3) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
 
 impl CloudBuffers {
-    /// Uploads a cloud in chunks of at most `max_chunk_points`; all bits are 0, and there are no colors. Returns the bytes uploaded too.
+    /// Uploads a cloud in chunks of at most `max_chunk_points`; all bits are 0, and there are no colors. Returns
+    /// the bytes uploaded too.
     ///
     /// # Errors
     /// [`RenderError`] for slices that do not belong together and clouds past the adapter's limits.

@@ -194,7 +194,8 @@ impl SplatRenderer {
         }
     }
 
-    /// Draws `cloud` from now on, with all signs 0 and nothing marked, highlighted or colored. It comes from [`Self::uploader`]. O(1).
+    /// Draws `cloud` from now on, with all signs 0 and nothing marked, highlighted or colored. It comes from
+    /// [`Self::uploader`]. O(1).
     pub fn show_cloud(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, cloud: UploadedCloud) {
         self.clear_cloud();
         self.set_highlight(device, queue, &[]);
@@ -488,9 +489,7 @@ impl SplatRenderer {
     }
 
     /// What draws a picture of `size` pixels, beside the window's and without changing it, in this thread or another:
-    /// see [`PictureMaker::make`]. `pixels_per_point` scales lines and spheres, `transparent` leaves the background out.
-    /// O(1).
-    #[expect(clippy::too_many_arguments, reason = "those of draw, and one more")]
+    /// see [`PictureMaker::make`]. The arguments are those of [`Self::draw`]. O(1).
     pub fn picture_maker(
         &self,
         device: &wgpu::Device,
@@ -499,16 +498,12 @@ impl SplatRenderer {
         size: [u32; 2],
         pixels_per_point: f32,
         settings: &DrawSettings,
-        transparent: bool,
     ) -> PictureMaker {
         PictureMaker {
             device: device.clone(),
             queue: queue.clone(),
             stage: self.stage(),
-            shot: Shot {
-                transparent,
-                ..self.shot(camera, size, pixels_per_point, settings)
-            },
+            shot: self.shot(camera, size, pixels_per_point, settings),
             max_tile_side: PictureMaker::tile_side(device),
         }
     }

@@ -216,8 +216,9 @@ impl Graphics {
         let size = [width, height];
         // Edges are as wide on a large picture, seen as a whole, as on one that fits a screen.
         let line_scale = (width.min(height) as f32 / SCREEN_SIDE).max(1.0);
-        let transparent = arguments.transparent;
-        let maker = renderer.picture_maker(device, queue, &camera, size, line_scale, &settings, transparent);
+        let maker = renderer
+            .picture_maker(device, queue, &camera, size, line_scale, &settings)
+            .with_transparency(arguments.transparent);
         let picture = maker.make(&mut |fraction| progress.report(fraction).is_ok());
         if let Some(failure) = self.failure.lock().unwrap_or_else(PoisonError::into_inner).take() {
             bail!("the graphics driver cannot draw this ({failure}): try a smaller --size");

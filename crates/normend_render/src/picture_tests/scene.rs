@@ -120,7 +120,8 @@ impl Scene {
     pub fn maker(&self, size: [u32; 2], transparent: bool) -> PictureMaker {
         let HeadlessDevice { device, queue, .. } = &self.gpu;
         self.renderer
-            .picture_maker(device, queue, &self.camera, size, 1.0, &self.settings, transparent)
+            .picture_maker(device, queue, &self.camera, size, 1.0, &self.settings)
+            .with_transparency(transparent)
     }
 
     pub fn draw(&mut self) -> bool {
