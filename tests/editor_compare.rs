@@ -49,8 +49,13 @@ fn the_input_is_shown_left_of_a_line_that_can_be_dragged() {
     let n_wrong = n_back(&editor);
     editor.mend();
     leave_view(&mut editor);
-    assert!(n_back(&editor) < n_wrong / 10);
-    editor.key(Modifiers::NONE, Key::C);
+    let turned = editor.app().document().unwrap().next_undo().unwrap().n_turned();
+    assert!(
+        n_back(&editor) < n_wrong / 10,
+        "{} of {n_wrong} after {turned} turned",
+        n_back(&editor)
+    );
+    editor.key(Modifiers::NONE, Key::K);
     editor.wait("the input", |app| app.comparing().is_ready());
     editor.harness.run_steps(3);
     assert_eq!(editor.app().comparing().style, Style::Split);
@@ -62,7 +67,10 @@ fn the_input_is_shown_left_of_a_line_that_can_be_dragged() {
         pixels.filter(|&(x, y)| is_back(picture.at(x, y))).count()
     };
     let (left, right) = (side(0..middle - 8), side(middle + 8..picture.width));
-    assert!(left > n_wrong / 4 && right < n_wrong / 20, "{left} left, {right} right of {n_wrong}");
+    assert!(
+        left > n_wrong / 4 && right < n_wrong / 20,
+        "{left} left, {right} right of {n_wrong}"
+    );
     // Drag the line to the right edge: the input is everywhere.
     let view = editor.app().view_rect();
     let event = |editor: &mut Editor, pos: Pos2, pressed: bool| {
@@ -82,8 +90,12 @@ fn the_input_is_shown_left_of_a_line_that_can_be_dragged() {
     assert!(editor.app().comparing().split > 0.98);
     leave_view(&mut editor);
     assert!(n_back(&editor) > n_wrong * 9 / 10);
-    assert_eq!(editor.app().document().unwrap().steps().count(), 1, "comparing is no edit");
-    editor.key(Modifiers::NONE, Key::C);
+    assert_eq!(
+        editor.app().document().unwrap().steps().count(),
+        1,
+        "comparing is no edit"
+    );
+    editor.key(Modifiers::NONE, Key::K);
     editor.harness.run_steps(3);
     assert!(n_back(&editor) < n_wrong / 10);
 }
@@ -94,12 +106,12 @@ fn the_automatic_result_is_made_for_scans_that_kept_their_normals() {
     let n_wrong = n_back(&editor);
     editor.choose("With", Other::Automatic.label());
     // Motion is reduced here, so each press shows the other one.
-    editor.key(Modifiers::SHIFT, Key::C);
+    editor.key(Modifiers::SHIFT, Key::K);
     editor.wait("the automatic result", |app| app.comparing().is_ready());
     editor.harness.run_steps(3);
     assert!(editor.app().comparing().shows_other());
     assert!(n_back(&editor) < n_wrong / 10, "the automatic method finds the cap");
-    editor.key(Modifiers::SHIFT, Key::C);
+    editor.key(Modifiers::SHIFT, Key::K);
     editor.harness.run_steps(3);
     assert_eq!(n_back(&editor), n_wrong);
 }
@@ -133,7 +145,12 @@ fn without_reduced_motion_both_are_shown_in_turn_and_no_faster_than_two_a_second
 fn wrong_points_are_marked_and_counted_with_every_edit() {
     let Some(mut editor) = start() else { return };
     let path = reference(editor.folder.path(), "truth.ply", N_POINTS, |_| {});
-    let n_cap = editor.normals().iter().zip(shapes::sphere(N_POINTS).normals).filter(|(a, b)| a.dot(*b) < 0.0).count();
+    let n_cap = editor
+        .normals()
+        .iter()
+        .zip(shapes::sphere(N_POINTS).normals)
+        .filter(|(a, b)| a.dot(*b) < 0.0)
+        .count();
     assert!(editor.app().availability(Command::NextWrong).is_err());
     editor.harness.state_mut().act(Action::OpenReference(path));
     editor.wait("the counts", |app| app.comparing().judged().is_some());

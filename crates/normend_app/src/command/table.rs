@@ -142,13 +142,13 @@ commands! {
         "Find the sides of the selected points again, from what is around them", [alt(Key::X)];
     FlipSources: Mend 2, "Flip sources", "Turn the selected sources", [];
     RemoveSources: Mend 2, "Remove sources", "Remove the selected sources", [key(Key::Delete), key(Key::Backspace)];
-    NextSuspect: Mend 8, "Next suspect", "Fly to the next patch that probably points to the wrong side", [key(Key::N)];
-    PreviousSuspect: Mend 8, "Previous suspect", "Fly to the suspect before", [shift(Key::N)];
-    FlipSuspect: Mend 8, "Flip suspect", "Turn the suspect in the view, and go on to the next (Enter does so too)", [];
-    AcceptSuspect: Mend 8, "Accept suspect",
+    NextSuspect: Mend 3, "Next suspect", "Fly to the next patch that probably points to the wrong side", [key(Key::N)];
+    PreviousSuspect: Mend 3, "Previous suspect", "Fly to the suspect before", [shift(Key::N)];
+    FlipSuspect: Mend 3, "Flip suspect", "Turn the suspect in the view, and go on to the next (Enter does so too)", [];
+    AcceptSuspect: Mend 3, "Accept suspect",
         "The suspect in the view is right as it is: it is not listed again", [key(Key::Space)];
-    FindSuspects: Mend 8, "Look for suspects", "Look for what seems wrong, with the signs as they are now", [];
-    Propagate: Mend 3, "Propagate", "Orient again with the parameters of the panel; sources stay", [ctrl(Key::Enter)];
+    FindSuspects: Mend 3, "Look for suspects", "Look for what seems wrong, with the signs as they are now", [];
+    Propagate: Mend 4, "Propagate", "Orient again with the parameters of the panel; sources stay", [ctrl(Key::Enter)];
 
     // View.
     Frame: View 0, "Frame", "Show what is selected, or else the whole scan", [key(Key::F)];
@@ -186,8 +186,8 @@ commands! {
     ToggleHair: View 7, "Normals as hair", "Show normals as short lines, or hide them", [key(Key::I)];
     ToggleSpheres: View 7, "Sources as spheres", "Show sources as spheres, or hide them", [shift(Key::I)];
     CompareSplit: View 8, "Compare side by side",
-        "Show the input, the automatic result or a reference left of a line, and the present right of it", [key(Key::C)];
-    CompareBlink: View 8, "Compare in turn", "Show the other and the present in turn", [shift(Key::C)];
+        "Show the input, the automatic result or a reference left of a line, and the present right of it", [key(Key::K)];
+    CompareBlink: View 8, "Compare in turn", "Show the other and the present in turn", [shift(Key::K)];
     NextWrong: View 8, "Next wrong region", "Fly to the next region that is wrong against the reference", [key(Key::W)];
     PreviousWrong: View 8, "Previous wrong region",
         "Fly to the region before that is wrong against the reference", [shift(Key::W)];
