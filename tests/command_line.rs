@@ -831,7 +831,11 @@ fn render_draws_right_normals_blue_and_turned_ones_orange() {
     assert!(pairs.filter(|(_, pixel)| pixel[3] != 0).all(|(a, b)| a == b));
     // With y down, the top is what the front is with z up.
     let n_other = |typed: &str| {
-        run(&folder, &format!("render right.ply -o top.png --size 400x300 {typed}")).expect(0);
+        run(
+            &folder,
+            &format!("render right.ply -o top.png --overwrite --size 400x300 {typed}"),
+        )
+        .expect(0);
         let top = image::open(folder.path().join("top.png")).unwrap().to_rgba8();
         with.pixels().zip(top.pixels()).filter(|(a, b)| a != b).count()
     };
