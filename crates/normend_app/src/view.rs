@@ -91,8 +91,8 @@ impl App {
                 ui.set_cursor_icon(CursorIcon::Crosshair);
             }
         }
-        if let (Some(position), Some(text)) = (pointer.position, self.badge_text(pointer)) {
-            self.viewport.badge(ui, position, &text);
+        if let (Some(position), Some((sign, text))) = (pointer.position, self.badge(pointer)) {
+            self.viewport.badge(ui, position, sign, &text);
         }
     }
 
@@ -125,10 +125,10 @@ impl App {
         action
     }
 
-    /// What a click or a stroke at the pointer would do.
-    fn badge_text(&self, pointer: &PointerOnView) -> Option<String> {
+    /// What a click or a stroke at the pointer would do: how it joins the selection, and words.
+    fn badge(&self, pointer: &PointerOnView) -> Option<(&'static str, String)> {
         if self.selecting.is_busy() {
-            return Some("Selecting…".to_owned());
+            return Some(("", "Selecting…".to_owned()));
         }
         let of_source = || {
             let session = self.session.as_ref()?;
@@ -146,20 +146,15 @@ impl App {
                 theme::thousands(u64::from(point))
             ))
         };
-        match self.tool {
-            Tool::Mend => self.point_tool.badge().or_else(of_source),
-            Tool::Patch | Tool::Component => {
-                let sign = Combine::of(pointer.modifiers).sign();
-                let text = self.point_tool.badge().unwrap_or_else(|| self.tool.label().to_owned());
-                Some(format!("{sign} {text}").trim_start().to_owned())
-            }
-            Tool::Brush | Tool::Lasso | Tool::Rectangle | Tool::Polygon => {
-                let combine = self.painting.combine().unwrap_or(Combine::of(pointer.modifiers));
-                let through = if self.visible_only { "" } else { ", through" };
-                let text = format!("{} {}{through}", combine.sign(), self.tool.label());
-                Some(text.trim_start().to_owned())
-            }
-        }
+        let combine = self.painting.combine().unwrap_or(Combine::of(pointer.modifiers));
+        let name = self.tool.label();
+        let text = match self.tool {
+            Tool::Mend => return Some(("", self.point_tool.badge().or_else(of_source)?)),
+            Tool::Patch | Tool::Component => self.point_tool.badge().unwrap_or_else(|| name.to_owned()),
+            _ if self.visible_only => name.to_owned(),
+            _ => format!("{name}, through"),
+        };
+        Some((combine.sign(), text))
     }
 
     /// The first click of a double-click did something; the user meant the pivot.

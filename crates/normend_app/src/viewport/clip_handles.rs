@@ -288,7 +288,7 @@ impl Viewport {
             let value = f64::from(drag.face.value(bounds)) + self.bounds.origin[axis];
             // Digits down to a ten-thousandth of the scan.
             let digits = (4.0 - (2.0 * self.bounds.radius()).log10().floor()).clamp(0.0, 12.0) as usize;
-            self.badge(ui, place, &format!("{} = {value:.digits$}", ["x", "y", "z"][axis]));
+            self.badge(ui, place, "", &format!("{} = {value:.digits$}", ["x", "y", "z"][axis]));
         }
     }
 

@@ -1,5 +1,6 @@
 //! What is painted over the picture: the pivot, words beside the pointer, and notices of states that hide or change something.
 
+use egui::text::{LayoutJob, TextFormat};
 use egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, StrokeKind, TextureId, Ui, Vec2};
 
 use super::{Viewport, gizmo};
@@ -74,11 +75,16 @@ impl Viewport {
         rect.top() - SPACE_XS
     }
 
-    /// A few words beside the pointer.
-    pub fn badge(&self, ui: &Ui, pointer: Pos2, text: &str) {
+    /// A few words beside the pointer, after a sign if there is one.
+    pub fn badge(&self, ui: &Ui, pointer: Pos2, sign: &str, text: &str) {
         let painter = ui.painter_at(self.rect);
         let color = ui.visuals().strong_text_color();
-        let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(13.0), color);
+        let mut words = LayoutJob::default();
+        // Only this font has the signs of sets.
+        words.append(sign, 0.0, TextFormat::simple(FontId::monospace(15.0), color));
+        let gap = if sign.is_empty() { 0.0 } else { SPACE_S };
+        words.append(text, gap, TextFormat::simple(FontId::proportional(13.0), color));
+        let galley = painter.layout_job(words);
         let padding = Vec2::new(8.0, 4.0);
         let size = galley.size() + 2.0 * padding;
         let mut min = pointer + Vec2::new(18.0, 14.0);
