@@ -46,7 +46,7 @@ impl App {
         }
         if let Some(report) = report {
             self.messages.error(format!(
-                "Normend closed unexpectedly the last time. A report for its makers is at {}.",
+                "Normend closed unexpectedly the last time. Your edits are kept: open the scan again. A report is at {}.",
                 report.display()
             ));
         }
