@@ -143,7 +143,10 @@ fn messages_are_filtered_copied_and_cleared() {
         })
         .collect();
     assert_eq!(copied.len(), 1);
-    assert!(copied[0].ends_with("  Note  Redo: there is nothing to redo.\n"), "{copied:?}");
+    assert!(
+        copied[0].ends_with("  Note  Redo: there is nothing to redo.\n"),
+        "{copied:?}"
+    );
     assert!(!copied[0].contains("Kept the given normals"));
     editor.click_button("Clear");
     assert!(editor.shows("Nothing was said yet") && editor.app().messages().entries().is_empty());
@@ -207,8 +210,15 @@ fn every_window_has_names_for_its_widgets_in_both_themes() {
             check(&mut editor, &format!("{what}-{name}"));
             if key == Key::Comma {
                 editor.click_button("Keys");
+                let label = "Search a command or a key";
+                editor.harness.get_by_role_and_label(Role::TextInput, label).focus();
+                editor.harness.run_steps(2);
+                let field = editor.harness.get_by_role_and_label(Role::TextInput, label);
+                field.type_text("ctrl+z");
+                editor.harness.run_steps(3);
                 editor.click_button("Add a key to Undo");
                 editor.key(Modifiers::COMMAND, Key::E);
+                assert!(editor.shows("Ctrl+E is the key of “Export…”"));
                 check(&mut editor, &format!("keys-{name}"));
             }
             editor.key(Modifiers::NONE, Key::Escape);
