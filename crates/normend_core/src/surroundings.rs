@@ -1,7 +1,7 @@
 //! What lies around a set of points in space: grows and shrinks selections by steps of about a splat.
 //!
-//! Two points touch when they are no farther apart than the wider of their discs is wide. That follows the density of the
-//! cloud, and it does not care what the normals say, so a step also crosses creases and thin walls.
+//! A point touches those whose places its disc reaches: on a surface, those around it. That follows the density of the cloud, and it
+//! does not care what the normals say, so a step also crosses creases and thin walls.
 //!
 //! Invariant: growing never loses points and shrinking never gains any; results do not depend on the number of threads.
 //! Not here: which points hang together, see [`crate::spanning_tree`].
@@ -16,6 +16,9 @@ use crate::{Cancelled, PointCloud, PointSet, Progress};
 
 /// Points that one task handles at a time.
 const POINTS: usize = 4096;
+
+/// A disc reaches so much farther than its radius, which may be the very distance to a neighbor.
+const ROUNDING: f32 = 1e-3;
 
 /// A cloud prepared for questions about what touches what. About 30 bytes a point.
 pub struct Surroundings {
@@ -56,7 +59,7 @@ impl Surroundings {
         })
     }
 
-    /// The set with all points that touch one of it. Points past the end of the cloud are left as they are. O(set · log n), in
+    /// The set with all points that one of it touches. Points past the end of the cloud are left as they are. O(set · log n), in
     /// parallel.
     ///
     /// # Errors
@@ -88,7 +91,7 @@ impl Surroundings {
         Ok(grown)
     }
 
-    /// The set without the points that one outside of it touches. O(set · log n), in parallel.
+    /// The set without the points that touch one outside of it. O(set · log n), in parallel.
     ///
     /// # Errors
     /// [`Cancelled`] when `progress` asks to stop; nothing else.
@@ -123,11 +126,11 @@ impl Surroundings {
 
     /// Gives `take` the points that touch an existing one, itself among them, until it says no.
     fn visit_touching(&self, point: u32, mut take: impl FnMut(u32) -> bool) {
-        let width = 2.0 * self.radii[point as usize];
+        let reach = self.radii[point as usize] * (1.0 + ROUNDING);
         let results = self
             .tree
             .query(&self.places[point as usize])
-            .within::<SquaredEuclidean<f32>>(width * width)
+            .within::<SquaredEuclidean<f32>>(reach * reach)
             .unsorted()
             .execute();
         for result in results {
@@ -163,7 +166,7 @@ mod tests {
     fn a_step_along_a_row_reaches_the_next_point_and_back() {
         for scale in [1e-12, 1.0, 1e6] {
             let row = (0..20).map(|x| Vec3::X * (x as f32 * scale)).collect();
-            let row = surroundings(row, 0.6 * scale);
+            let row = surroundings(row, scale);
             let middle: PointSet = (8..12).collect();
             let grown = row.grow(&middle, &Silent).unwrap();
             assert_eq!(grown, (7..13).collect());
@@ -190,7 +193,7 @@ mod tests {
             let at = |&(x, y, z): &(u8, u8, u8)| Vec3::new(f32::from(x), f32::from(y), f32::from(z));
             let places: Vec<Vec3> = points.iter().map(at).collect();
             let set: PointSet = (0..places.len() as u32).filter(|&point| bits[point as usize]).collect();
-            let cloud = surroundings(places.clone(), 0.55);
+            let cloud = surroundings(places.clone(), 1.0);
             let touches = |a: u32, b: u32| places[a as usize].distance(places[b as usize]) <= 1.05;
             let all = 0..places.len() as u32;
             let grown: PointSet = all.clone().filter(|&a| set.iter().any(|b| touches(a, b))).collect();
