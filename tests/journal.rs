@@ -63,7 +63,7 @@ fn scripted(scan: &normend_io::Scan, name: &str, n_events: usize) -> Recipe {
             6 => Edit::Unpin(points),
             7 => Edit::Select(points),
             8 => Edit::FlipPoints {
-                points: document.facing_away(&points, Viewer::At(Vec3::splat(9.0))),
+                points: document.facing_away(&points, Viewer::At(Vec3::splat(9.0))).unwrap(),
                 reason: FlipReason::FaceMe,
             },
             9 | 10 => {
@@ -248,7 +248,8 @@ fn can_run(folder: &Path) -> bool {
         .env("XDG_RUNTIME_DIR", folder)
         .output()
         .unwrap();
-    let can = rendered.status.success() && display().is_some() && xdotool(":0", &["version"]);
+    let can_point = display().is_some_and(|(_server, display)| xdotool(&display, &["getmouselocation"]));
+    let can = rendered.status.success() && can_point;
     let is_required = std::env::var_os("NORMEND_REQUIRE_GPU").is_some_and(|value| value == "1");
     assert!(
         can || !is_required,

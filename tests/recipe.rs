@@ -200,6 +200,7 @@ fn edits_of_a_file_that_changed_are_never_applied() {
 
     // Kept as a recipe, it is one for the file that it was made for.
     editor.click_button("Keep as recipe…");
+    editor.harness.run_steps(2);
     let field = editor.harness.get_by_role_and_label(Role::TextInput, "Save to");
     let target = folder.join("sphere.before.normend");
     assert_eq!(field.value(), Some(target.display().to_string()));

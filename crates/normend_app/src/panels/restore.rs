@@ -48,8 +48,8 @@ pub fn ui(ui: &Ui, name: &str, n_points: usize, offer: &Offer, n_more: usize) ->
             let points = theme::counted(scan.n_points, "point", "points");
             let now = theme::thousands(n_points as u64);
             paragraphs.push(format!(
-                "{n_edits} were made to {name} when the file had another content ({points}; now {now}). They are not applied, because \
-                 they could turn other points than they were meant for."
+                "There is a journal with {n_edits} of an earlier content of {name} ({points}; now {now}). It is not applied, because it \
+                 could turn other points than were meant."
             ));
         }
         if let Some(modified) = offer.modified {
@@ -104,15 +104,9 @@ fn kinds(ui: &mut Ui, offer: &Offer) {
         lines.push(("Others".to_owned(), n_rest));
     }
     ui.add_space(SPACE_S);
-    egui::Grid::new("kinds of edits").num_columns(2).show(ui, |ui| {
-        for (kind, n) in lines {
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                ui.label(theme::thousands(n as u64));
-            });
-            ui.label(kind);
-            ui.end_row();
-        }
-    });
+    for (kind, n) in lines {
+        ui.label(format!("{} × {kind}", theme::thousands(n as u64)));
+    }
     ui.add_space(SPACE_S);
 }
 
