@@ -125,19 +125,20 @@ impl Editor {
 
     /// Opens a tab of the side panel.
     pub fn open_tab(&mut self, tab: SideTab) {
-        self.click_button(tab.label());
+        // A menu may have the same name; it comes before.
+        let tabs = self.harness.query_all_by_role_and_label(Role::Button, tab.label());
+        tabs.last().unwrap().click();
+        self.harness.run_steps(2);
     }
 
-    /// Clicks the row of a list that begins with `text`.
+    /// Clicks the row of the side panel that begins with `text`; what stands before the panel may begin so too.
     pub fn click_row(&mut self, text: &str) {
-        let mut rows = self.harness.query_all_by_role(Role::Button);
-        let row = rows.find(|row| {
-            row.accesskit_node()
-                .label()
-                .is_some_and(|label| label.starts_with(text))
-        });
+        let begins = |row: &egui_kittest::Node<'_>| {
+            let label = row.accesskit_node().label();
+            label.is_some_and(|label| label.starts_with(text))
+        };
+        let row = self.harness.query_all_by_role(Role::Button).filter(begins).last();
         row.unwrap_or_else(|| panic!("no row begins with {text}")).click();
-        drop(rows);
         self.harness.run_steps(2);
     }
 
