@@ -32,7 +32,10 @@ fn read(path: &Path) -> RgbaImage {
 }
 
 fn n_back(picture: &RgbaImage) -> usize {
-    picture.pixels().filter(|pixel| is_back([pixel[0], pixel[1], pixel[2]])).count()
+    picture
+        .pixels()
+        .filter(|pixel| is_back([pixel[0], pixel[1], pixel[2]]))
+        .count()
 }
 
 #[test]
@@ -58,7 +61,10 @@ fn a_picture_is_the_view_and_larger_ones_look_the_same() {
     type_path(&mut editor, "Save to", &path);
     editor.click_button("Save");
     assert!(editor.shows("This file exists"));
-    editor.harness.get_by_role_and_label(Role::CheckBox, "Replace what is there").click();
+    editor
+        .harness
+        .get_by_role_and_label(Role::CheckBox, "Replace what is there")
+        .click();
     editor.harness.run_steps(2);
     editor.choose("Size", "2 × the view");
     editor
@@ -71,12 +77,18 @@ fn a_picture_is_the_view_and_larger_ones_look_the_same() {
     let double = read(&path);
     assert_eq!(double.dimensions(), (2 * view.width as u32, 2 * height as u32));
     let (n_small, n_large) = (n_back(&picture), n_back(&double));
-    assert!(n_large > 3 * n_small && n_large < 5 * n_small, "{n_large} and {n_small}");
+    assert!(
+        n_large > 3 * n_small && n_large < 5 * n_small,
+        "{n_large} and {n_small}"
+    );
     assert_eq!(double.get_pixel(2, 2)[3], 0, "nothing stands behind the scan");
     assert_eq!(picture.get_pixel(2, 2)[3], 255);
     let center = double.get_pixel(view.width as u32, height as u32);
     assert_eq!(center[3], 255);
-    assert!(editor.picture().rgba == view.rgba, "the view is as it was");
+    editor.hover(editor.app().view_rect().left_bottom() + egui::Vec2::new(5.0, -5.0));
+    editor.wait("nothing under the pointer", |app| app.n_would_turn().is_none());
+    editor.harness.run_steps(10);
+    assert!(editor.picture().rgba == view.rgba, "the view is not as it was");
 }
 
 #[test]
@@ -120,12 +132,16 @@ fn a_turntable_turns_once_around_and_can_be_cancelled() {
     let field = editor.harness.get_by_role_and_label(Role::SpinButton, "Pictures");
     field.focus();
     editor.harness.run_steps(2);
-    for _ in 0..68 {
-        editor.key(Modifiers::NONE, Key::ArrowDown);
-    }
+    editor.key(Modifiers::COMMAND, Key::A);
+    editor.harness.event(egui::Event::Text("4".to_owned()));
+    editor.harness.run_steps(2);
     editor.click_button("Save");
     editor.wait("the pictures", |app| !app.is_busy());
-    assert!(editor.said("Saved 4 pictures"), "{:?}", editor.app().messages().entries());
+    assert!(
+        editor.said("Saved 4 pictures"),
+        "{:?}",
+        editor.app().messages().entries()
+    );
     let counts: Vec<usize> = (0..4)
         .map(|frame| n_back(&read(&folder.join(format!("turntable_{frame:03}.png")))))
         .collect();
@@ -138,7 +154,8 @@ fn a_turntable_turns_once_around_and_can_be_cancelled() {
 
     editor.harness.state_mut().act(Command::Turntable.into());
     editor.harness.run_steps(2);
-    type_path(&mut editor, "Folder", &editor.folder.path().join("long"));
+    let long = editor.folder.path().join("long");
+    type_path(&mut editor, "Folder", &long);
     editor.click_button("Save");
     assert!(editor.app().is_busy());
     editor.key(Modifiers::NONE, Key::Escape);

@@ -29,7 +29,11 @@ fn colored_sphere(folder: &Path) -> Option<PathBuf> {
     for (index, position) in shapes::sphere(N_POINTS).positions.into_iter().enumerate() {
         let [x, y, z] = position.to_array();
         let [red, green] = if z > 0.0 { [230, 20] } else { [20, 230] };
-        let height = if index == 7 { "nan".to_owned() } else { format!("{}", 100.0 * z) };
+        let height = if index == 7 {
+            "nan".to_owned()
+        } else {
+            format!("{}", 100.0 * z)
+        };
         writeln!(text, "{x} {y} {z} {red} {green} 10 {height}").unwrap();
     }
     let path = folder.join("colored.xyz");
@@ -85,7 +89,9 @@ fn hues(picture: &Picture) -> BTreeSet<u32> {
 
 #[test]
 fn every_coloring_is_chosen_from_the_list_and_by_key() {
-    let Some(mut editor) = start(colored_sphere) else { return };
+    let Some(mut editor) = start(colored_sphere) else {
+        return;
+    };
     let mut seen = vec![editor.app().display_mode()];
     for _ in 1..Coloring::ALL.len() {
         editor.key(Modifiers::NONE, Key::D);
@@ -115,7 +121,9 @@ fn what_is_not_known_cannot_be_shown_and_says_why() {
 
 #[test]
 fn colors_of_the_file_are_those_of_its_points() {
-    let Some(mut editor) = start(colored_sphere) else { return };
+    let Some(mut editor) = start(colored_sphere) else {
+        return;
+    };
     assert_eq!(editor.picture().count(is_green), 0);
     show(&mut editor, Coloring::File);
     editor.key(Modifiers::NONE, Key::Num1);
@@ -132,7 +140,9 @@ fn colors_of_the_file_are_those_of_its_points() {
 
 #[test]
 fn confidence_has_a_scale_and_a_plain_body_is_sure() {
-    let Some(mut editor) = start(colored_sphere) else { return };
+    let Some(mut editor) = start(colored_sphere) else {
+        return;
+    };
     show(&mut editor, Coloring::Confidence);
     let [red, green, _] = coloring::scale(1.0).map(|channel| (channel * 255.0) as i32);
     assert!(red > 200 && green > 200, "the upper end is yellow");
@@ -144,7 +154,9 @@ fn confidence_has_a_scale_and_a_plain_body_is_sure() {
 
 #[test]
 fn a_turned_patch_has_a_color_of_its_own_and_only_it_is_uploaded() {
-    let Some(mut editor) = start(colored_sphere) else { return };
+    let Some(mut editor) = start(colored_sphere) else {
+        return;
+    };
     show(&mut editor, Coloring::Regions);
     let before = editor.picture();
     assert_eq!(hues(&before).len(), 1, "one body is one region: {:?}", hues(&before));
@@ -152,12 +164,16 @@ fn a_turned_patch_has_a_color_of_its_own_and_only_it_is_uploaded() {
     let place = editor.place(visible);
     editor.hover(place);
     editor.wait("a preview", |app| app.n_would_turn().is_some());
+    let n_uploaded = editor.app().bytes_uploaded();
     editor.click(place);
     editor.wait("a source", |app| !app.document().unwrap().sources().is_empty());
     editor.wait("the colors", |app| app.is_painted());
+    let n_uploaded = editor.app().bytes_uploaded() - n_uploaded;
     editor.harness.run_steps(3);
     let n_turned = editor.app().document().unwrap().next_undo().unwrap().n_turned();
     assert!(n_turned > 0 && (n_turned as usize) < N_POINTS / 2);
+    // Colors take 4 bytes a point; bits, highlights and the sphere of the source take little besides.
+    assert!(n_uploaded < 5 * n_turned + 2048, "{n_uploaded} bytes for {n_turned} points");
     let document = editor.app().document().unwrap();
     let names: BTreeSet<u32> = document.region_names(0..N_POINTS as u32).into_iter().collect();
     assert_eq!(names.len(), 2);
@@ -170,9 +186,14 @@ fn a_turned_patch_has_a_color_of_its_own_and_only_it_is_uploaded() {
 
 #[test]
 fn what_is_turned_against_the_evidence_is_shown_as_a_conflict() {
-    let Some(mut editor) = start(colored_sphere) else { return };
+    let Some(mut editor) = start(colored_sphere) else {
+        return;
+    };
     show(&mut editor, Coloring::Conflict);
-    assert!(editor.picture().count(is_red) < 200, "nothing speaks against a plain body");
+    assert!(
+        editor.picture().count(is_red) < 200,
+        "nothing speaks against a plain body"
+    );
     show(&mut editor, Coloring::Scalar);
     editor.harness.state_mut().act(Action::SelectValues {
         range: [0.0, f64::INFINITY],
@@ -197,7 +218,9 @@ fn what_is_turned_against_the_evidence_is_shown_as_a_conflict() {
 
 #[test]
 fn a_drag_over_the_histogram_selects_points() {
-    let Some(mut editor) = start(colored_sphere) else { return };
+    let Some(mut editor) = start(colored_sphere) else {
+        return;
+    };
     show(&mut editor, Coloring::Scalar);
     assert!(editor.shows("Histogram of height"));
     let drag = |editor: &mut Editor, from: f32, to: f32, modifiers: Modifiers| {
@@ -252,7 +275,10 @@ fn hair_stands_on_points_and_spheres_can_be_hidden() {
     editor.key(Modifiers::NONE, Key::I);
     editor.harness.run_steps(3);
     let n_outside = |picture: &Picture| picture.count(|pixel| is_back(pixel) || is_front(pixel));
-    assert!(n_outside(&editor.picture()) > n_outside(&before) + 300, "hair stands out beyond the sphere");
+    assert!(
+        n_outside(&editor.picture()) > n_outside(&before) + 300,
+        "hair stands out beyond the sphere"
+    );
     assert!(editor.shows("Length"));
     editor.key(Modifiers::NONE, Key::I);
     editor.harness.run_steps(3);
@@ -281,6 +307,9 @@ fn a_section_leaves_a_slice() {
     let n_slice = editor.picture().count(is_scan);
     assert!(n_slice > 100 && n_slice < n_before / 3, "{n_slice} of {n_before}");
     editor.key(Modifiers::NONE, Key::Num7);
+    let button = editor.harness.get_by_role_and_label(Role::Button, "Across the view");
+    button.scroll_to_me();
+    editor.harness.run_steps(20);
     editor.click_button("Across the view");
     let turned = editor.app().clip().section.unwrap();
     assert!(turned.direction.dot(Vec3::Z) > 0.999, "{turned:?}");

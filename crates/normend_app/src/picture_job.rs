@@ -111,7 +111,8 @@ impl App {
             return;
         }
         let Some(scene) = &self.scene else {
-            self.messages.error("No picture was made: there is no graphics adapter.");
+            self.messages
+                .error("No picture was made: there is no graphics adapter.");
             return;
         };
         let dark = self.ctx.theme() == egui::Theme::Dark;
@@ -200,15 +201,24 @@ fn draw(maker: &PictureMaker, progress: &dyn Progress, part: std::ops::Range<f32
 
 fn write(path: &Path, [width, height]: [u32; 2], rgba: &[u8]) -> Result<(), JobError> {
     let mut png = std::io::Cursor::new(Vec::new());
-    image::write_buffer_with_format(&mut png, rgba, width, height, ExtendedColorType::Rgba8, ImageFormat::Png)
-        .map_err(|error| JobError::Failed(format!("{} cannot be made: {error}.", path.display())))?;
+    image::write_buffer_with_format(
+        &mut png,
+        rgba,
+        width,
+        height,
+        ExtendedColorType::Rgba8,
+        ImageFormat::Png,
+    )
+    .map_err(|error| JobError::Failed(format!("{} cannot be made: {error}.", path.display())))?;
     normend_io::write_bytes(path, png.get_ref()).map_err(|error| JobError::Failed(format!("{error}.")))
 }
 
 /// `size` times `factor`, when that is not more than a picture can have.
 pub fn enlarged(size: [u32; 2], factor: u32) -> Option<[u32; 2]> {
     let size = size.map(|side| side.saturating_mul(factor));
-    size.iter().all(|side| (1..=MAX_PICTURE_SIDE).contains(side)).then_some(size)
+    size.iter()
+        .all(|side| (1..=MAX_PICTURE_SIDE).contains(side))
+        .then_some(size)
 }
 
 #[cfg(test)]

@@ -59,9 +59,9 @@ pub fn ui(ui: &mut Ui, document: &Document, comparing: &mut Comparing) -> Option
         });
         comparing.other = other;
         if comparing.style == Style::Split {
-            theme::input_row(ui, "Line", "Where the line is; drag it in the view too", |ui| {
+            theme::input_row(ui, "Line, %", "Where the line is; drag it in the view too", |ui| {
                 let mut percent = 100.0 * comparing.split;
-                let slider = ui.add(Slider::new(&mut percent, 0.0..=100.0).suffix(" %").fixed_decimals(0));
+                let slider = ui.add(Slider::new(&mut percent, 0.0..=100.0).fixed_decimals(0));
                 if slider.changed() {
                     comparing.split = percent / 100.0;
                 }
@@ -122,7 +122,7 @@ fn against_reference(ui: &mut Ui, comparing: &mut Comparing) -> Option<Action> {
             action = Some(Command::NextWrong.into());
         }
         closes = ui
-            .button("Close")
+            .button("Close reference")
             .on_hover_text("Compare with no reference any more")
             .clicked();
     });

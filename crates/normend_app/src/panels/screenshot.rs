@@ -72,7 +72,11 @@ impl PictureWindow {
     pub fn new(is_turntable: bool, view: [u32; 2], name: &str, folder: &Path) -> Self {
         let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy();
         let names = (1..).map(|number: u32| {
-            let number = if number == 1 { String::new() } else { format!("_{number}") };
+            let number = if number == 1 {
+                String::new()
+            } else {
+                format!("_{number}")
+            };
             if is_turntable {
                 folder.join(format!("{stem}_turntable{number}"))
             } else {
@@ -108,7 +112,11 @@ impl PictureWindow {
 
     /// Shows the window.
     pub fn ui(&mut self, ui: &Ui) -> Decision {
-        let title = if self.is_turntable { "Turntable" } else { "Picture of the view" };
+        let title = if self.is_turntable {
+            "Turntable"
+        } else {
+            "Picture of the view"
+        };
         modal::show(ui, title, WIDTH, |ui| self.content(ui))
     }
 
@@ -150,7 +158,11 @@ impl PictureWindow {
                     ui.add(DragValue::new(&mut self.n_frames).range(FRAMES))
                 });
                 let secs = self.n_frames as f32 / FRAMES_PER_SEC;
-                theme::row(ui, "Length", format!("{secs:.1} s at {FRAMES_PER_SEC:.0} pictures a second"));
+                theme::row(
+                    ui,
+                    "Length",
+                    format!("{secs:.1} s at {FRAMES_PER_SEC:.0} pictures a second"),
+                );
             }
         });
         ui.checkbox(&mut self.transparent, "Transparent background")
@@ -230,7 +242,10 @@ impl PictureWindow {
                 n_frames: self.n_frames,
             });
         }
-        if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
+        if !path
+            .extension()
+            .is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
+        {
             let mut name = path.file_name().unwrap_or_default().to_owned();
             name.push(".png");
             path.set_file_name(name);
@@ -270,7 +285,12 @@ mod tests {
         assert_eq!(window.target(), Some(PictureTarget::File(first.clone())));
         std::fs::write(&first, "a picture").unwrap();
         assert_eq!(window.target(), None);
-        assert!(window.problem.as_ref().is_some_and(|problem| problem.contains("exists")));
+        assert!(
+            window
+                .problem
+                .as_ref()
+                .is_some_and(|problem| problem.contains("exists"))
+        );
         window.replace = true;
         assert_eq!(window.target(), Some(PictureTarget::File(first)));
         let next = PictureWindow::new(false, [100, 50], "scan.ply", folder.path());
@@ -292,7 +312,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut window = PictureWindow::new(false, [100, 50], "scan.ply", folder.path());
         window.path = folder.path().join("a.b").display().to_string();
-        assert_eq!(window.target(), Some(PictureTarget::File(folder.path().join("a.b.png"))));
+        assert_eq!(
+            window.target(),
+            Some(PictureTarget::File(folder.path().join("a.b.png")))
+        );
         window.path = folder.path().display().to_string() + ".PNG";
         assert!(matches!(window.target(), Some(PictureTarget::File(path)) if path.extension().unwrap() == "PNG"));
         window.size = Size::Fourfold;

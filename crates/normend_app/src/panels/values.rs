@@ -141,10 +141,9 @@ fn select_fields(ui: &mut Ui, histogram: &Histogram, scale: &Scale<'_>) -> Optio
     let speed = (histogram.range[1] - histogram.range[0]).abs().max(f64::MIN_POSITIVE) / 200.0;
     let mut action = None;
     ui.horizontal(|ui| {
-        ui.label(RichText::new("Select").weak());
         for (end, name) in range.iter_mut().zip(["from", "to"]) {
             let label = ui.label(RichText::new(name).weak());
-            let field = ui.add(DragValue::new(end).speed(speed).suffix(scale.unit));
+            let field = ui.add(DragValue::new(end).speed(speed).max_decimals(3));
             field.labelled_by(label.id);
         }
         let button = ui.button("Select");

@@ -211,9 +211,9 @@ impl ViewTab<'_> {
                 "How much of what is near is cut away\n{}",
                 Command::CutDeeper.tooltip_with_keys(ui.ctx())
             );
-            theme::input_row(ui, "Cut near", &tooltip, |ui| {
+            theme::input_row(ui, "Cut near, %", &tooltip, |ui| {
                 let mut percent = self.viewport.clip.near * 100.0;
-                let slider = ui.add(Slider::new(&mut percent, 0.0..=100.0).suffix(" %").fixed_decimals(0));
+                let slider = ui.add(Slider::new(&mut percent, 0.0..=100.0).fixed_decimals(0));
                 if slider.changed() {
                     self.viewport.clip.near = percent / 100.0;
                 }
@@ -352,10 +352,10 @@ fn section_fields(ui: &mut Ui, cloud: &PointCloud, diagonal: f32, section: &mut 
     let direction = section.direction.normalize_or(Vec3::Z);
     theme::rows(ui, "section", |ui| {
         let tooltip = "How thick the slice is that stays, as a part of the scan's size";
-        theme::input_row(ui, "Thickness", tooltip, |ui| -> Response {
+        theme::input_row(ui, "Thickness, %", tooltip, |ui| -> Response {
             let mut percent = 100.0 * section.thickness / diagonal;
             let slider = Slider::new(&mut percent, 100.0 * THINNEST_SECTION..=100.0);
-            let slider = ui.add(slider.logarithmic(true).suffix(" %").max_decimals(1));
+            let slider = ui.add(slider.logarithmic(true).fixed_decimals(1));
             if slider.changed() {
                 section.thickness = percent / 100.0 * diagonal;
             }
@@ -363,11 +363,11 @@ fn section_fields(ui: &mut Ui, cloud: &PointCloud, diagonal: f32, section: &mut 
         });
         theme::input_row(
             ui,
-            "Place",
+            "Place, %",
             "Where the slice is, from one end of the scan to the other",
             |ui| -> Response {
                 let mut percent = 50.0 + 100.0 * (section.point - middle).dot(direction) / diagonal;
-                let slider = ui.add(Slider::new(&mut percent, 0.0..=100.0).suffix(" %").max_decimals(1));
+                let slider = ui.add(Slider::new(&mut percent, 0.0..=100.0).fixed_decimals(1));
                 if slider.changed() {
                     section.point = middle + direction * (percent - 50.0) / 100.0 * diagonal;
                 }
