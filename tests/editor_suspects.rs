@@ -77,7 +77,8 @@ fn the_wrong_cap_is_found_shown_flipped_and_comes_back_with_undo() {
     }
 
     editor.key(Modifiers::NONE, Key::Enter);
-    let n_cap = (before.iter()).filter(|normal| normal.dot(SHOWN) < -0.8).count() as u64;
+    let outward = shapes::sphere(N_POINTS).normals;
+    let n_cap = outward.iter().filter(|normal| normal.dot(SHOWN) > 0.8).count() as u64;
     assert_eq!(n_different(&before, &editor.normals()), n_cap);
     assert_eq!(last_kind(&editor), Some(EditKind::FlipSuspect));
     assert_eq!((focus(&editor), count(&editor, Standing::Turned)), (None, 1));

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 use normend_core::document::ComponentSide;
 use normend_core::evidence::{self, Evidence, Known, Station};
+use normend_core::progress::Part;
 use normend_core::side_rule::{Clues, Side, decide_side};
 use normend_core::sources::Origin;
 use normend_core::{Document, Edit, PointSet, Propagation, SideRule, SpanningTree, Start};
@@ -272,7 +273,13 @@ fn decide(
                     .filter(|evidence| evidence.origins().iter().any(is_outside))
                     .cloned();
             }
-            clues.gather(rule, &known, progress)?;
+            if let RuleChoice::TowardPlace(place) = choice {
+                // Only what is seen from there counts; all points vote where the scanner's place is known to have seen them.
+                let part = Part::new(progress, 0.0..0.5);
+                let (normals, radii) = (&propagation.normals, &propagation.splat_radii);
+                clues.scanner = Some(evidence::inside_views(&cloud, radii, normals, &[place], &part)?);
+            }
+            clues.gather(rule, &known, &Part::new(progress, 0.5..1.0))?;
             let tree = &propagation.tree;
             let components = which.map_or(0..tree.roots().len(), |component| component..component + 1);
             let is_turned = |point: u32| signs.is_turned(tree.position(point));
@@ -544,9 +551,15 @@ mod tests {
             .apply(document.turn_component_edit(1).unwrap().unwrap())
             .unwrap();
         assert_eq!(turned(&ask(&document, outward)), [false, true]);
-        // From the middle of the large sphere it faces inward, and the small one toward it where it is nearest.
-        let inside = ask(&document, RuleChoice::TowardPlace(DVec3::ZERO));
+        // From the middle of the large sphere it faces inward; from outside what is seen of it faces outward.
         let large = usize::from(points_of(&document.propagation().unwrap().tree, 0).len() != 2000);
-        assert!(inside[large].1.turned && inside[large].1.rule == Some(SideRule::TowardScanner));
+        for (place, expect) in [(DVec3::ZERO, true), (DVec3::new(-5.0, 0.5, 0.2), false)] {
+            let (_, side) = ask(&document, RuleChoice::TowardPlace(place))[large];
+            assert_eq!(
+                (side.turned, side.rule),
+                (expect != (large == 1), Some(SideRule::TowardScanner)),
+                "{place}"
+            );
+        }
     }
 }

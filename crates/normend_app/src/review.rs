@@ -63,7 +63,7 @@ impl App {
             if let Some(direction) = row.right_side() {
                 camera.look_from(direction);
             }
-            camera.frame_points(row.frame(), pixels.x / pixels.y);
+            camera.frame_points(row.close_frame(), pixels.x / pixels.y);
             let maker = scene.picture_maker(&camera, look.pixels, scale, &settings);
             Some(maker.with_highlight(row.outline().ranges()))
         });

@@ -25,6 +25,8 @@ const MOST: usize = 100;
 const MAX_SAMPLES: usize = 63;
 /// How far around a suspect the view shows, in its own radius: enough to see what it differs from.
 const SURROUNDINGS: f32 = 2.5;
+/// The same for small pictures, where the suspect itself must be seen.
+const CLOSE_SURROUNDINGS: f32 = 1.2;
 /// The least radius that is shown, as a part of the scan's diagonal.
 const LEAST_RADIUS: f32 = 0.01;
 /// A mean of unit normals shorter than this points nowhere: the suspect bends round.
@@ -417,7 +419,16 @@ impl Row {
 
     /// World positions around the suspect and some of what is around it: what a view of it shows.
     pub fn frame(&self) -> [Vec3; 6] {
-        let reach = SURROUNDINGS * self.radius;
+        self.around(SURROUNDINGS)
+    }
+
+    /// World positions close around the suspect, for small pictures.
+    pub fn close_frame(&self) -> [Vec3; 6] {
+        self.around(CLOSE_SURROUNDINGS)
+    }
+
+    fn around(&self, radii: f32) -> [Vec3; 6] {
+        let reach = radii * self.radius;
         let [x, y, z] = Vec3::AXES.map(|axis| axis * reach);
         [x, -x, y, -y, z, -z].map(|offset| self.middle + offset)
     }

@@ -46,7 +46,8 @@ pub fn ui(ui: &mut Ui, session: &Session, blocked: Option<&str>) -> Option<Actio
         if components.len() > 1 {
             ui.horizontal(|ui| {
                 ui.spacing_mut().item_spacing.x = SPACE_XS;
-                let name = ui.label(RichText::new("All parts").weak());
+                let (place, _) = ui.allocate_exact_size(Vec2::new(SIZE_WIDTH, ROW_HEIGHT), egui::Sense::hover());
+                let name = ui.put(place, egui::Label::new(RichText::new("All parts").weak()));
                 let (chosen, combo) = rules(ui, session, propagation, "all parts", "Choose a rule", None);
                 combo.labelled_by(name.id);
                 action = chosen.map(Action::from).or(action.take());
@@ -64,6 +65,7 @@ fn buttons(ui: &mut Ui, session: &Session) -> Option<ComponentAction> {
         ui.spacing_mut().item_spacing.x = SPACE_XS;
         let button = |ui: &mut Ui, text: &str, tooltip: &str| {
             let response = ui.add_enabled(focus.is_some(), Button::new(text));
+            let response = response.accessible_name(format!("{text} the part"));
             let response = response.on_hover_text(tooltip);
             response
                 .on_disabled_hover_text("Click the size of a part first")

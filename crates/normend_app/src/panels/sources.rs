@@ -77,6 +77,7 @@ fn kinds(ui: &mut Ui, session: &Session, blocked: Option<&str>) -> Option<Action
                 if drop.on_disabled_hover_text(blocked.unwrap_or_default()).clicked() {
                     action = Some(Action::DropKind(kind));
                 }
+                ui.add_space(SPACE_XS);
                 ui.label(RichText::new(theme::thousands(session.kinds.count(kind))).weak());
             });
         });

@@ -1,13 +1,16 @@
 //! The suspects: a ranked list with small pictures, and a card in the view that gives both sides of the argument.
 
-use egui::{Align2, Area, Button, Id, Image, Label, Order, ProgressBar, Rect, RichText, ScrollArea, Sense, Ui, Vec2};
+use egui::{
+    Align, Align2, Area, Button, Id, Image, Label, Layout, Order, ProgressBar, Rect, RichText, ScrollArea, Sense, Ui,
+    Vec2,
+};
 use normend_core::suspects::{Grounds, Kind, LEAST_POINTS, Suspect};
 
 use crate::command::{Action, Command};
 use crate::session::Session;
 use crate::suspect_pictures::{self, SuspectPictures};
 use crate::suspects_list::{Row, Standing, SuspectAction, SuspectsList};
-use crate::theme::{self, SPACE_M, SPACE_S, SPACE_XS};
+use crate::theme::{self, SPACE_L, SPACE_M, SPACE_S, SPACE_XS};
 
 /// What the list is.
 pub const ABOUT: &str = "Patches that probably point to the wrong side, the most likely and largest first.\n\
@@ -16,7 +19,7 @@ pub const ABOUT: &str = "Patches that probably point to the wrong side, the most
 /// Height of a row, in points.
 const ROW_HEIGHT: f32 = suspect_pictures::SIZE.y + 2.0 * SPACE_XS;
 /// Width of the card, in points.
-const CARD_WIDTH: f32 = 380.0;
+const CARD_WIDTH: f32 = 540.0;
 /// From here on (or below its opposite) the seam says something.
 const CLEAR_SEAM: f32 = 0.1;
 
@@ -224,15 +227,15 @@ fn row_ui(
     taken_back.or(focuses.then_some(SuspectAction::Focus(index)))
 }
 
-/// Both sides of the argument about the suspect in focus, at the upper left of `view`.
+/// Both sides of the argument about the suspect in focus, at the lower edge of `view`.
 pub fn card(ui: &Ui, view: Rect, list: &SuspectsList) -> Option<Action> {
     let index = list.focus()?;
     let row = list.row(index)?;
     let mut action = None;
     Area::new(Id::unique("suspect"))
         .order(Order::Middle)
-        .pivot(Align2::LEFT_TOP)
-        .fixed_pos(view.left_top() + Vec2::splat(SPACE_M))
+        .pivot(Align2::CENTER_BOTTOM)
+        .fixed_pos(view.center_bottom() - Vec2::new(0.0, SPACE_M))
         .show(ui.ctx(), |ui| {
             theme::card(ui).show(ui, |ui| {
                 ui.set_width(CARD_WIDTH.min(view.width() - 6.0 * SPACE_M));
@@ -250,17 +253,21 @@ pub fn card(ui: &Ui, view: Rect, list: &SuspectsList) -> Option<Action> {
                 ui.label(format!("{n_points}, {} to be wrong", percent(row.suspect.score)));
                 ui.add_space(SPACE_XS);
                 let [flip, keep] = arguments(&row.suspect);
-                ui.columns(2, |columns| {
-                    for (column, (title, reasons)) in
-                        columns.iter_mut().zip([("To flip it", flip), ("To keep it", keep)])
-                    {
-                        column.label(RichText::new(title).strong());
-                        if reasons.is_empty() {
-                            column.label(RichText::new("Nothing").weak());
-                        }
-                        for reason in reasons {
-                            column.add(Label::new(reason).wrap());
-                        }
+                let width = 0.5 * (ui.available_width() - SPACE_L);
+                ui.horizontal_top(|ui| {
+                    ui.spacing_mut().item_spacing = Vec2::new(SPACE_L, SPACE_XS);
+                    for (title, reasons) in [("To flip it", flip), ("To keep it", keep)] {
+                        let column = Layout::top_down(Align::LEFT);
+                        ui.allocate_ui_with_layout(Vec2::new(width, 0.0), column, |ui| {
+                            ui.set_width(width);
+                            ui.label(RichText::new(title).strong());
+                            if reasons.is_empty() {
+                                ui.label(RichText::new("Nothing").weak());
+                            }
+                            for reason in reasons {
+                                ui.add(Label::new(reason).wrap());
+                            }
+                        });
                     }
                 });
                 ui.add_space(SPACE_S);
@@ -294,7 +301,12 @@ pub fn card(ui: &Ui, view: Rect, list: &SuspectsList) -> Option<Action> {
 
 /// How likely it is, in words.
 fn percent(score: f32) -> String {
-    format!("{:.0}% likely", 100.0 * score)
+    let percent = (100.0 * score).round();
+    if percent < 100.0 {
+        format!("{percent:.0}% likely")
+    } else {
+        "over 99% likely".to_owned()
+    }
 }
 
 /// The strongest reason, in a few words.

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use crate::command::Action;
 use crate::session::Session;
-use crate::theme::{self, SPACE_XS};
+use crate::theme::{self, SPACE_S, SPACE_XS};
 use crate::viewpoints::{MOST, ViewpointAction, Viewpoints};
 
 /// What the section is.
@@ -36,8 +36,10 @@ fn list(ui: &mut Ui, session: &mut Session) -> Option<Action> {
         format!("{} of your own", places.len())
     };
     ui.label(RichText::new(text).weak());
-    ui.horizontal_wrapped(|ui| {
+    ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = SPACE_XS;
+        // All four stand in one row.
+        ui.spacing_mut().button_padding.x = SPACE_S;
         let add = ui.add_enabled(places.len() < MOST, Button::new("Add here"));
         let add = add.on_hover_text("Let the place that you look from vote too");
         if add
