@@ -73,16 +73,17 @@ fn the_focus_stays_in_the_question() {
     editor.mend();
     editor.close();
     editor.harness.run_steps(2);
-    let mut seen = [false; 3];
+    let mut seen = [false; 4];
     for _ in 0..7 {
         editor.key(Modifiers::NONE, Key::Tab);
-        let focused = ["Export…", "Discard", "Cancel"].map(|label| editor.is_focused(Role::Button, label));
+        let focused =
+            ["Export…", "Keep for next time", "Discard", "Cancel"].map(|label| editor.is_focused(Role::Button, label));
         assert!(focused.contains(&true), "the focus left the question");
         for (seen, focused) in seen.iter_mut().zip(focused) {
             *seen |= focused;
         }
     }
-    assert_eq!(seen, [true; 3]);
+    assert_eq!(seen, [true; 4]);
     editor.key(Modifiers::NONE, Key::Escape);
     assert!(!editor.shows("Unsaved mends"));
 
