@@ -314,19 +314,11 @@ fn edits_survive_kills_of_the_window() {
         // Without a window manager nobody gives the keyboard to the window.
         xdotool(
             &display,
-            &["search", "--onlyvisible", "--name", "Normend", "windowfocus"],
+            &["search", "--onlyvisible", "--name", "Normend", "windowfocus", "--sync"],
         );
         xdotool(&display, &["mousemove", "330", "380"]);
-        // Keys that come faster than frames: mends, undo, redo.
-        let keys = [
-            "Return",
-            "Return",
-            "shift+Return",
-            "ctrl+z",
-            "Return",
-            "ctrl+shift+z",
-            "shift+Return",
-        ];
+        // Keys that come as fast as frames: a mend, or what it made is selected; flips of that, undo, redo.
+        let keys = ["Return", "Return", "x", "x", "ctrl+z", "ctrl+shift+z", "x"];
         let mut typing = Command::new("xdotool")
             .args(["key", "--delay", "15"])
             .args(keys.repeat(40))
