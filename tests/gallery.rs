@@ -16,6 +16,7 @@ use normend_app::coloring::Coloring;
 use normend_app::command::{Action, Command};
 use normend_app::panels::side::SideTab;
 use normend_app::settings::ThemeChoice;
+use normend_core::{Parameters, Start};
 
 /// Fewer colors are an empty picture: text alone has more shades of gray.
 const LEAST_COLORS: usize = 60;
@@ -51,7 +52,10 @@ impl Gallery {
     }
 
     fn shoot(&mut self, name: &str) {
-        self.editor.wait("no work", |app| !app.is_busy());
+        self.editor.wait("no work", |app| {
+            let looks = app.suspects().and_then(|suspects| suspects.status()).is_some();
+            !app.is_busy() && !looks && (app.document().is_none() || app.is_painted())
+        });
         self.editor.harness.run_steps(12);
         let picture = self.editor.harness.render().unwrap();
         let colors: BTreeSet<_> = picture.pixels().map(|pixel| pixel.0).collect();
@@ -83,13 +87,33 @@ fn gallery(choice: ThemeChoice, theme: &'static str) {
         gallery.editor.open_tab(tab);
         gallery.shoot(&format!("tab_{}", tab.label().to_lowercase()));
     }
+    gallery.editor.open_tab(SideTab::Suspects);
+    gallery.run(Command::NextSuspect);
+    gallery.shoot("suspect");
+    gallery.run(Command::FrameAll);
+    gallery.run(Command::ViewCorner);
+
+    // Colors are of what the automatic method finds.
+    let propagation = gallery.editor.app().document().unwrap().parameters();
+    let estimated = Parameters {
+        start: Start::Estimate,
+        ..propagation
+    };
+    gallery.editor.harness.state_mut().act(Action::Propagate(estimated));
+    gallery.editor.wait("an estimate", |app| {
+        let propagation = app.document().unwrap().propagation();
+        propagation.is_some_and(|propagation| propagation.parameters == estimated)
+    });
     gallery.editor.open_tab(SideTab::View);
     // The sample has neither colors nor other values.
     let of_the_file = [Coloring::File, Coloring::Scalar];
     for coloring in Coloring::ALL {
         if coloring != Coloring::Facing && !of_the_file.contains(&coloring) {
             gallery.color(coloring);
-            gallery.shoot(&format!("coloring_{}", coloring.label().to_lowercase().replace(' ', "_")));
+            gallery.shoot(&format!(
+                "coloring_{}",
+                coloring.label().to_lowercase().replace(' ', "_")
+            ));
         }
     }
     gallery.color(Coloring::Facing);
@@ -97,6 +121,7 @@ fn gallery(choice: ThemeChoice, theme: &'static str) {
         (Command::ToggleHair, "hair"),
         (Command::ClipBox, "clip_box"),
         (Command::Section, "section"),
+        // Against the input, whose wrong seat stands left of the line.
         (Command::CompareSplit, "compare"),
     ] {
         gallery.run(command);
@@ -117,7 +142,9 @@ fn gallery(choice: ThemeChoice, theme: &'static str) {
     }
     gallery.shoot("tool_lasso");
     gallery.editor.harness.drop_at(corners[4]);
-    gallery.editor.wait("a selection", |app| !app.document().unwrap().selected().is_empty());
+    gallery
+        .editor
+        .wait("a selection", |app| !app.document().unwrap().selected().is_empty());
     gallery.shoot("selection");
     gallery.run(Command::Flip);
     gallery.editor.open_tab(SideTab::History);
