@@ -363,7 +363,11 @@ mod tests {
         reach.step(9);
         settle(&mut reach, &document, 5);
         let aim = reach.aim(&document, 5, Means::Patch);
-        assert_eq!(aim.patch.map(|patch| patch.n_points), Some(8), "the row holds point 10");
+        assert_eq!(
+            aim.patch.map(|patch| patch.n_points),
+            Some(4),
+            "point 0 is vouched for with point 10"
+        );
         assert!(aim.n_hindering(&document, 5) > 0);
         // Selecting is not hindered.
         reach.step(9);
