@@ -847,6 +847,37 @@ fn render_draws_right_normals_blue_and_turned_ones_orange() {
 }
 
 #[test]
+fn render_turns_a_scan_once_around() {
+    let folder = folder();
+    // What lies behind points inward.
+    let points: Vec<_> = (sphere(20_000).into_iter())
+        .map(|(p, n)| if p.y > 0.0 { (p, -n) } else { (p, n) })
+        .collect();
+    fs::write(folder.path().join("half.ply"), ply_of(&points)).unwrap();
+    let line = "render half.ply -o film.png --size 200x200 --view front --turntable 4";
+    let rendered = run(&folder, line);
+    if rendered.code == Some(1) && rendered.err.contains("mesa-vulkan-drivers") {
+        let is_required = std::env::var_os("NORMEND_REQUIRE_GPU").is_some_and(|value| value == "1");
+        assert!(!is_required, "{}", rendered.err);
+        println!("skipped: no graphics adapter");
+        return;
+    }
+    rendered.expect(0);
+    let n_orange = |frame: usize| {
+        let picture = image::open(folder.path().join(format!("film_{frame:03}.png"))).unwrap().to_rgb8();
+        let is_orange = |p: &&image::Rgb<u8>| i32::from(p[0]) > i32::from(p[2]) + 40;
+        picture.pixels().filter(is_orange).count()
+    };
+    let counts: Vec<usize> = (0..4).map(n_orange).collect();
+    assert!(counts[0] < counts[2] / 10 && counts[2] > 200 * 200 / 6, "{counts:?}");
+    assert!(counts[1] > counts[2] / 4 && counts[1] < counts[2] * 3 / 4, "{counts:?}");
+    assert!(!folder.path().join("film.png").exists() && !folder.path().join("film_004.png").exists());
+    let again = run(&folder, line);
+    assert!(again.code == Some(1) && again.err.contains("film_000.png exists already"), "{}", again.err);
+    run(&folder, "render half.ply -o film.png --turntable 1").expect(2);
+}
+
+#[test]
 fn render_shows_the_colors_of_the_file_or_says_that_there_are_none() {
     let folder = folder();
     let truth = sphere(2_000);

@@ -376,7 +376,8 @@ set, Mesa itself complains of that on standard error, and draws all the same). A
 Examples:
   normend render oriented.ply -o picture.png
   normend render oriented.ply -o top.png --size 1920x1080 --view top --palette paper
-  normend render oriented.ply -o figure.png --size 7680x4320 --mode lit --transparent")]
+  normend render oriented.ply -o figure.png --size 7680x4320 --mode lit --transparent
+  normend render oriented.ply -o film.png --turntable 72")]
 pub struct RenderArguments {
     /// Scan to draw: PLY, or XYZ text
     pub input: PathBuf,
@@ -404,6 +405,10 @@ pub struct RenderArguments {
     /// Colors of front and back
     #[arg(long, value_name = "NAME", value_parser = one_of(&PaletteName::ALL, PaletteName::name), default_value = PaletteName::default().name())]
     pub palette: PaletteName,
+
+    /// Draw so many pictures while the scan turns once around, numbered before .png: PNG_000.png and so on
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=999))]
+    pub turntable: Option<u32>,
 
     /// Leave the background out, for a page of any color
     #[arg(long)]

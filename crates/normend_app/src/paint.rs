@@ -356,6 +356,9 @@ fn region_colors(names: &[u32]) -> Vec<u32> {
     names.par_iter().map(|&name| coloring::of_region(name)).collect()
 }
 
+/// Colors by position, with the values that they show and how those are spread, where there are any.
+type Coat = (Vec<u32>, Option<Values>, Option<Histogram>);
+
 /// All that colors are made from.
 struct Subject {
     scan: Arc<Scan>,
@@ -409,7 +412,7 @@ impl Subject {
         mut self,
         request: &Request,
         progress: &dyn Progress,
-    ) -> Result<(Vec<u32>, Option<Values>, Option<Histogram>), JobError> {
+    ) -> Result<Coat, JobError> {
         let in_words = |error: ReadError| match error {
             ReadError::Cancelled(_) => JobError::Cancelled,
             error => JobError::Failed(format!("{error}.")),

@@ -3,10 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use egui::ColorImage;
-use glam::Quat;
 use image::{ExtendedColorType, ImageFormat};
 use normend_core::Progress;
-use normend_render::{Camera, Compare, DrawSettings, HairLen, MAX_PICTURE_SIDE, PictureMaker, RenderError};
+use normend_render::{Compare, DrawSettings, HairLen, MAX_PICTURE_SIDE, PictureMaker, RenderError};
 
 use crate::app::App;
 use crate::job::{Job, JobError};
@@ -59,16 +58,6 @@ pub enum Made {
 /// The name of a turntable's picture in its folder.
 pub fn frame_name(frame: u32) -> String {
     format!("turntable_{frame:03}.png")
-}
-
-/// The camera of a turntable's picture: `share` of a turn around the up axis through the pivot.
-pub fn turned(camera: &Camera, share: f32) -> Camera {
-    let up = camera.up_axis.direction();
-    let turn = Quat::from_axis_angle(up, share * std::f32::consts::TAU);
-    Camera {
-        orientation: (turn * camera.orientation).normalize(),
-        ..*camera
-    }
 }
 
 /// The settings of a picture that is `scale` times as large as the view, so that it looks the same.
@@ -152,7 +141,7 @@ impl App {
                 for frame in 0..n_frames {
                     progress.stage(&format!("Picture {} of {n_frames}", frame + 1));
                     let share = |frame: u32| frame as f32 / n_frames as f32;
-                    maker = maker.with_camera(&turned(&camera, share(frame)));
+                    maker = maker.with_camera(&camera.on_turntable(share(frame)));
                     let rgba = draw(&maker, progress, share(frame)..share(frame + 1))?;
                     write(&folder.join(frame_name(frame)), size, &rgba)?;
                 }
@@ -223,23 +212,7 @@ pub fn enlarged(size: [u32; 2], factor: u32) -> Option<[u32; 2]> {
 
 #[cfg(test)]
 mod tests {
-    use normend_render::{StandardView, UpAxis};
-
     use super::*;
-
-    #[test]
-    fn a_turntable_turns_around_the_up_axis_and_ends_where_it_began() {
-        for up_axis in UpAxis::ALL {
-            let mut camera = Camera::new(StandardView::Corner, up_axis);
-            camera.pivot = glam::Vec3::new(1.0, 2.0, 3.0);
-            let up = up_axis.direction();
-            let quarter = turned(&camera, 0.25);
-            assert!((quarter.back().dot(up) - camera.back().dot(up)).abs() < 1e-5);
-            assert!(quarter.eye().distance(camera.eye()) > 0.1);
-            assert!(turned(&camera, 1.0).eye().distance(camera.eye()) < 1e-4);
-            assert_eq!(quarter.pivot, camera.pivot);
-        }
-    }
 
     #[test]
     fn pictures_are_not_larger_than_can_be_drawn() {

@@ -150,6 +150,15 @@ impl Camera {
         self.set_orientation(Quat::from_mat3(&(self.up_axis.frame() * upright)));
     }
 
+    /// The camera of a picture of a turntable: `share` of a turn around the upright axis through the pivot.
+    #[must_use]
+    pub fn on_turntable(&self, share: f32) -> Self {
+        let turn = Quat::from_axis_angle(self.up_axis.direction(), share * std::f32::consts::TAU);
+        let mut camera = *self;
+        camera.set_orientation(turn * self.orientation);
+        camera
+    }
+
     /// Takes the roll out: the horizon is level, and what is up in the world is up in the picture.
     pub fn level(&mut self) {
         let (azimuth, elevation) = self.angles();

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io::Cursor;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -111,28 +112,55 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<Outcome> {
             "pictures are PNG files: let the name of the output end with .png",
         ));
     }
-    check_may_write(&arguments.output, arguments.overwrite)?;
+    let outputs = outputs(arguments);
+    for output in &outputs {
+        check_may_write(output, arguments.overwrite)?;
+    }
     prepare(&arguments.common)?;
     // Before the work, so that a missing driver costs no time.
     let graphics = Graphics::open()?;
     let bar = Bar::new(&title_of(&arguments.input), arguments.common.quiet);
     let (document, colors) = read_oriented(arguments, &bar)?;
     bar.stage("Drawing");
-    let rgba = graphics.draw(&document, colors.as_deref(), arguments, &Part::new(&bar, 0.9..1.0))?;
     let PictureSize { width, height } = arguments.size;
+    let progress = Part::new(&bar, 0.9..1.0);
+    graphics.draw(&document, colors.as_deref(), arguments, &progress, |frame, rgba| {
+        write(&outputs[frame], arguments.size, rgba)
+    })?;
+    let more = match outputs.len() {
+        1 => String::new(),
+        n_pictures => format!(", the first of {n_pictures}"),
+    };
+    bar.say(&format!("{}: {width}x{height} pixels{more}", outputs[0].display()));
+    Ok(Outcome::Done)
+}
+
+/// The files to write: the output itself, or with a number before its extension those of a turntable.
+fn outputs(arguments: &RenderArguments) -> Vec<PathBuf> {
+    let output = &arguments.output;
+    match arguments.turntable {
+        None => vec![output.clone()],
+        Some(n_frames) => {
+            let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+            let name = |frame: u32| output.with_file_name(format!("{stem}_{frame:03}.png"));
+            (0..n_frames).map(name).collect()
+        }
+    }
+}
+
+fn write(output: &Path, PictureSize { width, height }: PictureSize, rgba: &[u8]) -> anyhow::Result<()> {
     let mut png = Cursor::new(Vec::new());
     image::write_buffer_with_format(
         &mut png,
-        &rgba,
+        rgba,
         width,
         height,
         ExtendedColorType::Rgba8,
         ImageFormat::Png,
     )
     .context("cannot make a PNG of the picture")?;
-    normend_io::write_bytes(&arguments.output, png.get_ref())?;
-    bar.say(&format!("{}: {width}x{height} pixels", arguments.output.display(),));
-    Ok(Outcome::Done)
+    normend_io::write_bytes(output, png.get_ref())?;
+    Ok(())
 }
 
 /// The scan with the normals of its file; points without one get an oriented normal. And the file's colors, where the mode
@@ -184,14 +212,15 @@ impl Graphics {
         Ok(Self { headless, failure })
     }
 
-    /// Rows of RGBA from the top.
+    /// Hands each picture over by its number: rows of RGBA from the top.
     fn draw(
         &self,
         document: &Document,
         colors: Option<&[u32]>,
         arguments: &RenderArguments,
         progress: &dyn Progress,
-    ) -> anyhow::Result<Vec<u8>> {
+        mut take: impl FnMut(usize, &[u8]) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
         let HeadlessDevice { device, queue, .. } = &self.headless;
         let PictureSize { width, height } = arguments.size;
         let cloud = document.cloud();
@@ -216,18 +245,25 @@ impl Graphics {
         let size = [width, height];
         // Edges are as wide on a large picture, seen as a whole, as on one that fits a screen.
         let line_scale = (width.min(height) as f32 / SCREEN_SIDE).max(1.0);
-        let maker = renderer
+        let mut maker = renderer
             .picture_maker(device, queue, &camera, size, line_scale, &settings)
             .with_transparency(arguments.transparent);
-        let picture = maker.make(&mut |fraction| progress.report(fraction).is_ok());
-        if let Some(failure) = self.failure.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            bail!("the graphics driver cannot draw this ({failure}): try a smaller --size");
+        let n_frames = arguments.turntable.unwrap_or(1);
+        for frame in 0..n_frames {
+            let share = |frame: u32| frame as f32 / n_frames as f32;
+            maker = maker.with_camera(&camera.on_turntable(share(frame)));
+            let part = Part::new(progress, share(frame)..share(frame + 1));
+            let picture = maker.make(&mut |fraction| part.report(fraction).is_ok());
+            if let Some(failure) = self.failure.lock().unwrap_or_else(PoisonError::into_inner).take() {
+                bail!("the graphics driver cannot draw this ({failure}): try a smaller --size");
+            }
+            match picture {
+                // The code of the program tells this apart from a failure.
+                Err(RenderError::Canceled) => return Err(Cancelled.into()),
+                picture => take(frame as usize, &picture?)?,
+            }
         }
-        match picture {
-            // The code of the program tells this apart from a failure.
-            Err(RenderError::Canceled) => Err(Cancelled.into()),
-            picture => Ok(picture?),
-        }
+        Ok(())
     }
 }
 

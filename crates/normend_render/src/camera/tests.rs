@@ -379,3 +379,17 @@ fn standard_views_follow_the_up_axis() {
         );
     }
 }
+
+#[test]
+fn a_turntable_turns_around_the_upright_axis_and_ends_where_it_began() {
+    for up_axis in UpAxis::ALL {
+        let mut camera = Camera::new(StandardView::Corner, up_axis);
+        camera.pivot = Vec3::new(1.0, 2.0, 3.0);
+        let up = up_axis.direction();
+        let quarter = camera.on_turntable(0.25);
+        assert!((quarter.back().dot(up) - camera.back().dot(up)).abs() < 1e-5);
+        assert!(quarter.eye().distance(camera.eye()) > 0.1);
+        assert!(camera.on_turntable(1.0).eye().distance(camera.eye()) < 1e-4);
+        assert_eq!(quarter.pivot, camera.pivot);
+    }
+}
