@@ -406,3 +406,30 @@ fn a_part_is_flipped_isolated_selected_and_faces_me() {
     assert!(editor.app().camera().pivot.distance(pivot) > 0.5);
     assert!(editor.app().camera().pivot.distance(Vec3::new(3.0, 0.0, 0.0)) < 0.3);
 }
+
+/// A scan of a scene from one place.
+fn scan_from_one_place(folder: &Path) -> Option<PathBuf> {
+    let clouds = shapes::benchmark_clouds();
+    let cloud = clouds.iter().find(|cloud| cloud.name == "room_office_1_station").unwrap();
+    let positions = cloud.generate(&Silent).unwrap().shape.positions;
+    let path = folder.join("scan.ply");
+    normend_io::write_points(&path, Positions::Float(&positions), None, &Silent).unwrap();
+    Some(path)
+}
+
+#[test]
+fn the_scanners_place_is_dropped_for_outward() {
+    let Some(mut editor) = open_sources(scan_from_one_place) else {
+        return;
+    };
+    let rule = |editor: &Editor| editor.app().document().unwrap().parameters().rule;
+    assert!(editor.shows("Scanner"));
+    editor.click_button("Drop Scanner");
+    wait_for_work(&mut editor);
+    assert_eq!(rule(&editor), SideRule::Outward);
+    assert!(!editor.shows("Drop Scanner"));
+    editor.key(Modifiers::COMMAND, Key::Z);
+    wait_for_work(&mut editor);
+    assert_eq!(rule(&editor), SideRule::Automatic);
+    assert!(editor.shows("Drop Scanner"));
+}

@@ -256,7 +256,7 @@ fn decide(
             });
             let known = Known {
                 given: given.as_ref().map(|normals| normals.as_slice()),
-                stations: station.as_ref().map_or(&[], std::slice::from_ref),
+                stations: station.as_slice(),
                 ..Known::default()
             };
             let mut clues = Clues::new(&cloud, &propagation.normals, &propagation.splat_radii);

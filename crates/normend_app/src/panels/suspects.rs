@@ -227,15 +227,15 @@ fn row_ui(
     taken_back.or(focuses.then_some(SuspectAction::Focus(index)))
 }
 
-/// Both sides of the argument about the suspect in focus, at the lower edge of `view`.
+/// Both sides of the argument about the suspect in focus, at the upper left of `view`.
 pub fn card(ui: &Ui, view: Rect, list: &SuspectsList) -> Option<Action> {
     let index = list.focus()?;
     let row = list.row(index)?;
     let mut action = None;
     Area::new(Id::unique("suspect"))
         .order(Order::Middle)
-        .pivot(Align2::CENTER_BOTTOM)
-        .fixed_pos(view.center_bottom() - Vec2::new(0.0, SPACE_M))
+        .pivot(Align2::LEFT_TOP)
+        .fixed_pos(view.left_top() + Vec2::splat(SPACE_M))
         .show(ui.ctx(), |ui| {
             theme::card(ui).show(ui, |ui| {
                 ui.set_width(CARD_WIDTH.min(view.width() - 6.0 * SPACE_M));
@@ -245,12 +245,11 @@ pub fn card(ui: &Ui, view: Rect, list: &SuspectsList) -> Option<Action> {
                     .collect();
                 let place = open.iter().position(|&each| each == index).unwrap_or_default() + 1;
                 let n_points = theme::counted(row.points.len(), "point", "points");
-                ui.label(
-                    RichText::new(format!("Suspect {place} of {}", open.len()))
-                        .color(theme::accent(ui))
-                        .strong(),
-                );
-                ui.label(format!("{n_points}, {} to be wrong", percent(row.suspect.score)));
+                ui.horizontal(|ui| {
+                    let title = format!("Suspect {place} of {}", open.len());
+                    ui.label(RichText::new(title).color(theme::accent(ui)).strong());
+                    ui.label(format!("{n_points}, {} to be wrong", percent(row.suspect.score)));
+                });
                 ui.add_space(SPACE_XS);
                 let [flip, keep] = arguments(&row.suspect);
                 let width = 0.5 * (ui.available_width() - SPACE_L);
@@ -273,7 +272,8 @@ pub fn card(ui: &Ui, view: Rect, list: &SuspectsList) -> Option<Action> {
                 ui.add_space(SPACE_S);
                 ui.horizontal(|ui| {
                     ui.spacing_mut().item_spacing.x = SPACE_XS;
-                    let flip = theme::primary_button(ui, "Flip").shortcut_text(Command::MendHere.keys_text(ui.ctx()));
+                    let flip_key = RichText::new(Command::MendHere.keys_text(ui.ctx())).color(egui::Color32::WHITE);
+                    let flip = theme::primary_button(ui, "Flip").shortcut_text(flip_key);
                     let accept = Button::new("Accept").shortcut_text(Command::AcceptSuspect.keys_text(ui.ctx()));
                     let next = Button::new("Next").shortcut_text(Command::NextSuspect.keys_text(ui.ctx()));
                     for (button, chosen, tooltip) in [
@@ -335,26 +335,26 @@ fn looks(votes: f32) -> String {
 fn arguments(suspect: &Suspect) -> [Vec<String>; 2] {
     let (mut flip, mut keep) = (Vec::new(), Vec::new());
     match suspect.kind {
-        Kind::Differs => flip.push("The automatic method has it the other way round.".to_owned()),
-        Kind::Whole => flip.push("The automatic method has this whole part the other way round.".to_owned()),
-        Kind::Doubtful => keep.push("The automatic method has it like this, but is not sure.".to_owned()),
+        Kind::Differs => flip.push("The automatic method disagrees.".to_owned()),
+        Kind::Whole => flip.push("The automatic method has the whole part the other way round.".to_owned()),
+        Kind::Doubtful => keep.push("The automatic method agrees, but is not sure.".to_owned()),
     }
     if suspect.kind != Kind::Whole {
         let seam = suspect.seam;
         if seam < -CLEAR_SEAM {
-            flip.push(format!("Across its edge, neighbors look the other way (seam {seam:.2}).").replace('-', "−"));
+            flip.push(format!("Neighbors look the other way (seam {seam:.2}).").replace('-', "−"));
         } else if seam > CLEAR_SEAM {
-            keep.push(format!("It fits its surroundings across its edge (seam {seam:.2})."));
+            keep.push(format!("It fits its surroundings (seam {seam:.2})."));
         }
     }
     let seen = |votes: f32, side: &str| {
         let n = votes.round() as u64;
-        (n > 0).then(|| format!("{} it from {side}.", theme::counted(n, "look sees", "looks see")))
+        (n > 0).then(|| format!("{} {side}.", theme::counted(n, "look sees", "looks see")))
     };
-    flip.extend(seen(suspect.votes_against, "behind"));
-    keep.extend(seen(suspect.votes_for, "the front"));
+    flip.extend(seen(suspect.votes_against, "its back"));
+    keep.extend(seen(suspect.votes_for, "its front"));
     if suspect.votes_for + suspect.votes_against < 0.5 {
-        keep.push("Nobody sees it, neither from outside nor along lines through the scan.".to_owned());
+        keep.push("Nobody sees it.".to_owned());
     }
     [flip, keep]
 }
@@ -362,9 +362,9 @@ fn arguments(suspect: &Suspect) -> [Vec<String>; 2] {
 /// Why nothing is suspected.
 fn belief(grounds: &Grounds) -> String {
     let mut text = format!(
-        "The side of {:.0}% of the points is seen, and the most doubtful patch of {LEAST_POINTS} points or more is right with {:.0}%.",
+        "The side of {:.0}% of the points is seen, and the most doubtful patch of {LEAST_POINTS} points or more is {} to be right.",
         (100.0 * grounds.share_known).floor(),
-        (100.0 * grounds.weakest).floor(),
+        percent(grounds.weakest),
     );
     if grounds.n_undecided > 0 {
         let parts = theme::counted(grounds.n_components as u64, "part", "parts");
@@ -422,8 +422,8 @@ mod tests {
         let [flip, keep] = arguments(&suspect(Kind::Differs, -0.8, 1.0, 41.0));
         assert_eq!(flip.len(), 3);
         assert!(flip[1].contains("seam −0.80"), "{flip:?}");
-        assert_eq!(flip[2], "41 looks see it from behind.");
-        assert_eq!(keep, ["1 look sees it from the front."]);
+        assert_eq!(flip[2], "41 looks see its back.");
+        assert_eq!(keep, ["1 look sees its front."]);
         let [flip, keep] = arguments(&suspect(Kind::Doubtful, 0.8, 0.0, 0.0));
         assert!(flip.is_empty());
         assert_eq!(keep.len(), 3);
@@ -438,7 +438,7 @@ mod tests {
             n_undecided: 3,
         };
         let text = belief(&grounds);
-        for part in ["98% of the points", "right with 91%", "3 of 1,200 parts"] {
+        for part in ["98% of the points", "92% likely to be right", "3 of 1,200 parts"] {
             assert!(text.contains(part), "{text}");
         }
     }
