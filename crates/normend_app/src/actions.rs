@@ -603,11 +603,11 @@ impl App {
         self.comparing.show_scan();
         self.clicked_revision = None;
         self.forget_what_is_under_way();
-        if let Some(scene) = &mut self.scene {
-            if let Err(error) = scene.show_points(session.document.cloud(), opened.cloud) {
-                self.messages
-                    .error(format!("The scan is open but cannot be shown: {error}."));
-            }
+        if let Some(scene) = &mut self.scene
+            && let Err(error) = scene.show_points(session.document.cloud(), opened.cloud)
+        {
+            self.messages
+                .error(format!("The scan is open but cannot be shown: {error}."));
         }
         if session.scan.n_left_out > 0 {
             let rows = theme::counted(session.scan.n_left_out as u64, "row", "rows");

@@ -271,10 +271,10 @@ impl Session {
             Edit::Mend(point) | Edit::TurnPatch { point, .. } | Edit::TurnWhole(point) => Some(point),
             _ => None,
         };
-        let is_interaction = match edit.kind() {
-            EditKind::SetParameters | EditKind::SetViewpoints | EditKind::Accept => false,
-            _ => true,
-        };
+        let is_interaction = !matches!(
+            edit.kind(),
+            EditKind::SetParameters | EditKind::SetViewpoints | EditKind::Accept
+        );
         let before = self.document.revision();
         let change = self.document.apply(edit)?;
         self.turned.push(change.clone());

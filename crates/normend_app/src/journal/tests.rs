@@ -80,10 +80,7 @@ fn every_edit_is_in_the_file_before_it_returns() {
     let findings = find_in(&folder);
     assert_eq!(findings.offers.len(), 2);
     // The newest first.
-    assert_eq!(
-        findings.offers.iter().map(found::Offer::n_edits).collect::<Vec<_>>(),
-        [1, 3]
-    );
+    assert_eq!(findings.offers.iter().map(Offer::n_edits).collect::<Vec<_>>(), [1, 3]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The list of what was done: a click goes there, back or forth.
 
-use egui::{Button, Color32, RichText, ScrollArea, Ui, Vec2};
+use egui::{Button, RichText, ScrollArea, Ui, Vec2};
 use normend_core::EditKind;
 use normend_core::document::Step;
 
@@ -44,7 +44,7 @@ pub fn ui(ui: &mut Ui, session: &Session) -> Option<Action> {
             if place == n_done {
                 let edge = response.rect.left_center();
                 let mark = egui::Rect::from_center_size(edge + Vec2::new(1.5, 0.0), Vec2::new(3.0, ROW_HEIGHT - 8.0));
-                ui.painter().rect_filled(mark, 1.5, Color32::from(theme::accent(ui)));
+                ui.painter().rect_filled(mark, 1.5, theme::accent(ui));
             }
             if response.clicked() && place != n_done {
                 action = Some(Action::GoToStep(place));
