@@ -18,7 +18,7 @@ use egui_kittest::kittest::Queryable;
 use glam::Vec3;
 use normend_core::document::FlipReason;
 use normend_core::sources::Origin;
-use normend_core::{Document, Edit, PointSet, Propagation, Silent, Source};
+use normend_core::{Document, Edit, Parameters, PointSet, Preset, Propagation, Silent, Source};
 use normend_io::recipe::{self, Recipe};
 
 use driver::{Editor, sphere_with_wrong_cap, sphere_without_normals, start};
@@ -126,6 +126,42 @@ fn edits_of_a_crash_are_offered_and_come_back_with_their_history() {
     editor.click_button("Discard");
     assert!(!editor.shows("Restore 1 edit?") && editor.journals().is_empty());
     assert_eq!(editor.n_sources(), 0);
+}
+
+#[test]
+fn edits_of_another_version_come_back_with_their_parameters() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    let scan = scan_of(&editor);
+    mend_twice_and_undo(&mut editor);
+    let [journal] = &editor.journals()[..] else {
+        panic!("not one journal")
+    };
+    // As a program would write it that is older and begins with other parameters.
+    let mut recipe = recipe::read(journal).unwrap().recipe;
+    recipe.head.program = "0.0.9".to_owned();
+    recipe.head.parameters = Parameters {
+        k_graph: 9,
+        ..Preset::Tree.parameters()
+    };
+    let (parameters, state) = (recipe.head.parameters, recipe.state());
+    recipe.write(journal).unwrap();
+    let mut editor = editor.crash_and_start(&scan);
+    editor.wait_until_oriented();
+    assert!(editor.shows("Made with Normend 0.0.9; this is"));
+    editor.click_button("Restore");
+    editor.wait("the other orientation", |app| {
+        let propagation = app.document().unwrap().propagation();
+        !app.is_busy() && propagation.is_some_and(|propagation| propagation.parameters == parameters)
+    });
+    let document = editor.app().document().unwrap();
+    assert_eq!(document.state(), &state);
+    // The parameters are where the history begins, so no undo reaches behind them.
+    assert_eq!((document.n_done(), document.steps().count()), (1, 2));
+    editor.key(Modifiers::COMMAND, Key::Z);
+    editor.wait_until_oriented();
+    assert_eq!(editor.app().document().unwrap().parameters(), parameters);
 }
 
 #[test]

@@ -43,7 +43,7 @@ pub(crate) enum RecipeJob {
         job: Job<()>,
         path: PathBuf,
         /// The journal that it is written from, in place of the present state.
-        offer: Option<Offer>,
+        offer: Option<Box<Offer>>,
     },
 }
 
@@ -230,6 +230,7 @@ impl App {
         };
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
         let offer = if of_offer { session.offers.pop_front() } else { None };
+        let offer = offer.map(Box::new);
         let recipe = match &offer {
             Some(offer) => offer.reading.recipe.clone(),
             None => Recipe::of_document(session.identity(), &session.document),
@@ -285,7 +286,7 @@ impl App {
                     self.settings.settings.remember_folder(Purpose::Recipe, &path);
                     self.messages.info(format!("Saved the recipe to {}.", path.display()));
                     // It is kept under its own name now.
-                    if let Some(Err(error)) = offer.map(Offer::remove) {
+                    if let Some(Err(error)) = offer.map(|offer| offer.remove()) {
                         self.messages.error(format!("The journal was not removed: {error}."));
                     }
                 }
@@ -296,7 +297,7 @@ impl App {
                     };
                     self.messages.error(format!("The recipe was not saved. {reason}."));
                     if let (Some(session), Some(offer)) = (&mut self.session, offer) {
-                        session.offers.push_front(offer);
+                        session.offers.push_front(*offer);
                     }
                 }
             },

@@ -12,6 +12,7 @@ use normend_core::evidence::Known;
 use normend_core::progress::Part;
 use normend_core::{Document, EditError, Method, Parameters, Progress, Propagation, SideRule, SourceRule, Start};
 use normend_io::WriteOptions;
+use normend_io::recipe::NamedParameters;
 use serde::{Serialize, Serializer};
 
 use super::{
@@ -79,33 +80,7 @@ impl Serialize for Seconds {
 
 /// Parameters in a report, under the names of their flags.
 pub(super) fn serialize_parameters<S: Serializer>(parameters: &Parameters, serializer: S) -> Result<S::Ok, S::Error> {
-    /// The parameters under the names of their flags.
-    #[derive(Serialize)]
-    struct Named {
-        method: &'static str,
-        estimator: &'static str,
-        k_normals: usize,
-        k_graph: usize,
-        edge_rule: &'static str,
-        start: &'static str,
-        sources: &'static str,
-        views: usize,
-        eta: f32,
-        rule: &'static str,
-    }
-    let named = Named {
-        method: parameters.method.name(),
-        estimator: parameters.estimator.name(),
-        k_normals: parameters.k_normals,
-        k_graph: parameters.k_graph,
-        edge_rule: parameters.edge_rule.name(),
-        start: parameters.start.name(),
-        sources: parameters.sources.name(),
-        views: parameters.views,
-        eta: parameters.eta,
-        rule: parameters.rule.name(),
-    };
-    named.serialize(serializer)
+    NamedParameters::from(*parameters).serialize(serializer)
 }
 
 /// Orients every input; one that fails does not stop the rest.
