@@ -387,16 +387,17 @@ impl App {
         let frame = egui::Frame::new()
             .fill(ui.visuals().panel_fill)
             .inner_margin(egui::Margin::symmetric(theme::SPACE_M as i8, theme::SPACE_M as i8));
+        let width = side::shown_width(settings.side_width, ui.available_width());
         Panel::right("side")
             .frame(frame)
             .resizable(false)
-            .exact_size(theme::SIDE_PANEL_WIDTH)
+            .exact_size(width)
             .show(ui, |ui| {
+                side::edge(ui, width, &mut settings.side_width);
                 ScrollArea::vertical()
                     .auto_shrink([false, false])
                     .show(ui, |ui| {
-                        // The same with and without the bar.
-                        ui.set_max_width(theme::SIDE_CONTENT_WIDTH);
+                        theme::fit_side_panel(ui, width);
                         side::tabs(ui, &mut settings.side_tab);
                         match settings.side_tab {
                             SideTab::Orient => orient::ui(ui, session, propagating, blocked),

@@ -1,5 +1,7 @@
 //! How the editor looks: one spacing scale, two themes, and the helpers that keep columns aligned.
 
+use std::ops::RangeInclusive;
+
 use egui::{Color32, CornerRadius, FontFamily, FontId, Margin, RichText, Stroke, TextStyle, Theme, Ui, Vec2};
 use normend_render::Palette;
 
@@ -14,16 +16,16 @@ pub const SPACE_M: f32 = 12.0;
 /// Between sections.
 pub const SPACE_L: f32 = 16.0;
 
-/// Width of the side panel, in points.
+/// Usual width of the side panel, in points.
 pub const SIDE_PANEL_WIDTH: f32 = 324.0;
-/// Width of what the side panel holds, with or without a bar.
-pub const SIDE_CONTENT_WIDTH: f32 = SIDE_PANEL_WIDTH - 2.0 * SPACE_M - SCROLL_WIDTH;
+/// Bounds of the side panel's width, in points: five tabs fit in a row, and values stay beside their labels.
+pub const SIDE_PANEL_WIDTHS: RangeInclusive<f32> = 280.0..=520.0;
 /// Width of the first column of label/value rows, in points.
 pub const LABEL_WIDTH: f32 = 104.0;
 /// Width of the scroll bar beside a panel, in points.
 pub const SCROLL_WIDTH: f32 = 6.0;
-/// Width of the second column, where inputs end at the same right edge, in points.
-pub const VALUE_WIDTH: f32 = SIDE_CONTENT_WIDTH - LABEL_WIDTH - SPACE_S;
+/// Width of the second column in windows, and in a side panel of the usual width, in points.
+const VALUE_WIDTH: f32 = SIDE_PANEL_WIDTH - 2.0 * SPACE_M - SCROLL_WIDTH - LABEL_WIDTH - SPACE_S;
 /// Width of the number beside a slider, in points.
 const SLIDER_VALUE_WIDTH: f32 = 52.0;
 /// Height of rows that are only read, in points.
@@ -120,8 +122,7 @@ pub fn apply(ctx: &egui::Context) {
         style.spacing.window_margin = Margin::same(SPACE_L as i8);
         style.spacing.menu_margin = Margin::same(SPACE_XS as i8);
         style.spacing.interact_size = Vec2::new(40.0, 26.0);
-        style.spacing.combo_width = VALUE_WIDTH;
-        style.spacing.slider_width = VALUE_WIDTH - SPACE_S - SLIDER_VALUE_WIDTH;
+        set_value_width(&mut style.spacing, VALUE_WIDTH);
         // A bar that shows that there is more, without the pointer over it.
         style.spacing.scroll = egui::style::ScrollStyle {
             floating_allocated_width: SCROLL_WIDTH,
@@ -141,6 +142,28 @@ pub fn apply(ctx: &egui::Context) {
         // The scale of the interface is a setting with commands of its own.
         options.zoom_with_keyboard = false;
     });
+}
+
+fn set_value_width(spacing: &mut egui::style::Spacing, width: f32) {
+    spacing.combo_width = width;
+    spacing.slider_width = width - SPACE_S - SLIDER_VALUE_WIDTH;
+}
+
+/// Lets columns fill a side panel of this width, in points, with or without a scroll bar.
+pub fn fit_side_panel(ui: &mut Ui, panel_width: f32) {
+    let content_width = panel_width - 2.0 * SPACE_M - SCROLL_WIDTH;
+    ui.set_max_width(content_width);
+    set_value_width(ui.spacing_mut(), content_width - LABEL_WIDTH - SPACE_S);
+}
+
+/// Width of the second column of [`rows`], where inputs end at the same right edge, in points.
+pub fn value_width(ui: &Ui) -> f32 {
+    ui.spacing().combo_width
+}
+
+/// Width of both columns of [`rows`], which is all of the side panel's, in points.
+pub fn content_width(ui: &Ui) -> f32 {
+    LABEL_WIDTH + SPACE_S + value_width(ui)
 }
 
 fn visuals(theme: Theme) -> egui::Visuals {

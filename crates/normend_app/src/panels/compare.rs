@@ -97,7 +97,7 @@ fn against_reference(ui: &mut Ui, comparing: &mut Comparing) -> Option<Action> {
         let count = |n: u64| format!("{} ({:.2} %)", theme::thousands(n), share(n));
         theme::row(ui, "Reference", name);
         theme::row(ui, "Wrong points", count(live.n_wrong()));
-        theme::row(ui, "Best flips", count(live.n_wrong_component_flip()));
+        theme::row(ui, "With best flips", count(live.n_wrong_component_flip()));
     });
     let mut action = None;
     if let Some((_, regions)) = comparing.regions() {
@@ -105,7 +105,7 @@ fn against_reference(ui: &mut Ui, comparing: &mut Comparing) -> Option<Action> {
             let text = format!("{} wrong", theme::counted(region.n_points as u64, "point", "points"));
             let is_there = comparing.at_region() == Some(index);
             let row =
-                ui.add(Button::selectable(is_there, text).min_size(egui::Vec2::new(theme::SIDE_CONTENT_WIDTH, 0.0)));
+                ui.add(Button::selectable(is_there, text).min_size(egui::Vec2::new(theme::content_width(ui), 0.0)));
             if row.on_hover_text("Fly there").clicked() {
                 action = Some(Action::ShowWrong(index));
             }

@@ -129,7 +129,7 @@ fn start_row(ui: &mut Ui, draft: &mut Parameters, has_normals: bool) {
         ui.spacing_mut().item_spacing.x = SPACE_XS;
         for each in Start::ALL {
             let possible = each != Start::Keep || has_normals;
-            let rest = theme::VALUE_WIDTH - SPACE_XS - KEEP_WIDTH;
+            let rest = theme::value_width(ui) - SPACE_XS - KEEP_WIDTH;
             let width = if each == Start::Keep { KEEP_WIDTH } else { rest };
             let button = Button::selectable(draft.start == each, each.label()).min_size(Vec2::new(width, 0.0));
             let response = ui.add_enabled(possible, button);

@@ -1,8 +1,15 @@
-//! The side panel: a row of tabs, and one of them open.
+//! The side panel: a row of tabs, one of them open, and an edge that is dragged.
 
-use egui::{Button, Ui, Vec2};
+use egui::{Button, CursorIcon, EventFilter, Id, Key, Modifiers, Rect, Sense, TextStyle, Ui, Vec2, WidgetInfo};
 
-use crate::theme::SPACE_XS;
+use crate::theme::{self, SPACE_M, SPACE_XS};
+
+/// Width of the strip at the edge that is dragged, in points: half of the margin, so that it covers no content.
+const EDGE_WIDTH: f32 = 0.5 * SPACE_M;
+/// What one press of an arrow key adds to the width, in points.
+const KEY_STEP: f32 = 16.0;
+/// What is left for the view in a small window, in points.
+const MIN_VIEW_WIDTH: f32 = 280.0;
 
 /// What the side panel shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -48,14 +55,70 @@ impl SideTab {
     }
 }
 
-/// The row of tabs; a click opens one.
+/// How wide the panel is drawn where the user wants `wanted` and the window has `room`, all in points.
+pub fn shown_width(wanted: f32, room: f32) -> f32 {
+    let narrowest = *theme::SIDE_PANEL_WIDTHS.start();
+    wanted.min((room - MIN_VIEW_WIDTH).max(narrowest))
+}
+
+/// The edge toward the view: a drag or the arrow keys change the panel's `wanted` width, a double-click brings the usual
+/// one back. `shown` is the present width; `ui` is that of the panel before anything is in it. In points.
+pub fn edge(ui: &Ui, shown: f32, wanted: &mut f32) {
+    let inside = ui.max_rect();
+    let panel = inside.expand(SPACE_M);
+    let strip = Rect::from_min_size(panel.min, Vec2::new(EDGE_WIDTH, panel.height()));
+    let response = ui.interact(strip, Id::unique("edge of the side panel"), Sense::click_and_drag());
+    let bounds = theme::SIDE_PANEL_WIDTHS;
+    response.widget_info(|| WidgetInfo::slider(true, f64::from(shown), "Width of the side panel"));
+    if response.dragged() {
+        *wanted = (shown - response.drag_delta().x).clamp(*bounds.start(), *bounds.end());
+    }
+    if response.double_clicked() {
+        *wanted = theme::SIDE_PANEL_WIDTH;
+    }
+    if response.has_focus() {
+        // The arrows are for the edge, not for the way to the next widget.
+        let filter = EventFilter {
+            horizontal_arrows: true,
+            ..EventFilter::default()
+        };
+        let step = ui.input_mut(|input| {
+            let mut pressed = |key| input.count_and_consume_key(Modifiers::NONE, key) as f32;
+            pressed(Key::ArrowLeft) - pressed(Key::ArrowRight)
+        });
+        ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
+        *wanted = (*wanted + KEY_STEP * step).clamp(*bounds.start(), *bounds.end());
+    }
+    if response.hovered() || response.dragged() || response.has_focus() {
+        let line = Rect::from_min_size(panel.min, Vec2::new(2.0, panel.height()));
+        ui.painter().rect_filled(line, 0.0, theme::accent(ui));
+    }
+    response
+        .on_hover_and_drag_cursor(CursorIcon::ResizeHorizontal)
+        .on_hover_text("Drag to make the panel wider or narrower; a double-click brings the usual width back");
+}
+
+/// The row of tabs; a click opens one. Together they are as wide as the panel's content, with the same room around each
+/// name.
 pub fn tabs(ui: &mut Ui, open: &mut SideTab) {
+    let width = theme::content_width(ui);
+    let font = TextStyle::Button.resolve(ui.style());
+    let color = ui.visuals().text_color();
+    let name_width = |label: &str| {
+        let laid_out = ui.painter().layout_no_wrap(label.to_owned(), font.clone(), color);
+        laid_out.size().x
+    };
+    let names = SideTab::ALL.map(|tab| name_width(tab.label()));
+    let n_tabs = names.len() as f32;
+    let gap = 0.5 * SPACE_XS;
+    let room = (width - names.iter().sum::<f32>() - (n_tabs - 1.0) * gap) / n_tabs;
     ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = SPACE_XS;
-        // As narrow as keeps all of them in one row.
-        ui.spacing_mut().button_padding.x = SPACE_XS;
-        for tab in SideTab::ALL {
-            let button = Button::selectable(*open == tab, tab.label()).min_size(Vec2::new(0.0, 26.0));
+        ui.spacing_mut().item_spacing.x = gap;
+        // The least width of each says how much room there is around its name.
+        ui.spacing_mut().button_padding.x = 0.0;
+        for (tab, name) in SideTab::ALL.into_iter().zip(names) {
+            let size = Vec2::new(name + room.max(0.0), 26.0);
+            let button = Button::selectable(*open == tab, tab.label()).min_size(size);
             if ui.add(button).on_hover_text(tab.tooltip()).clicked() {
                 *open = tab;
             }
@@ -64,4 +127,19 @@ pub fn tabs(ui: &mut Ui, open: &mut SideTab) {
     ui.add_space(SPACE_XS);
     ui.separator();
     ui.add_space(SPACE_XS);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shown_width;
+
+    #[test]
+    fn a_small_window_keeps_room_for_the_view() {
+        let check = |wanted, room, expect| assert_eq!(shown_width(wanted, room), expect, "{wanted} of {room}");
+        check(324.0, 1280.0, 324.0);
+        check(520.0, 1280.0, 520.0);
+        check(520.0, 700.0, 420.0);
+        // Where both do not fit, the panel stays readable.
+        check(520.0, 400.0, 280.0);
+    }
 }

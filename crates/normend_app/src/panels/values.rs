@@ -24,7 +24,7 @@ pub struct Scale<'a> {
 
 /// The colors of a scale from left to right, with what its ends mean.
 pub fn color_bar(ui: &mut Ui, color: &dyn Fn(f32) -> Rgb, low: &str, high: &str) {
-    let width = theme::SIDE_CONTENT_WIDTH;
+    let width = theme::content_width(ui);
     let (rect, _) = ui.allocate_exact_size(Vec2::new(width, BAR_HEIGHT), Sense::hover());
     let mut mesh = Mesh::default();
     for step in 0..=N_STEPS {
@@ -63,7 +63,7 @@ pub fn swatch(ui: &mut Ui, color: Rgb, label: &str) {
 /// The histogram over its scale; a drag over it, or the fields below it, select points.
 pub fn histogram(ui: &mut Ui, histogram: &Histogram, scale: &Scale<'_>, log_bars: bool) -> Option<Action> {
     let mut action = None;
-    let size = Vec2::new(theme::SIDE_CONTENT_WIDTH, HISTOGRAM_HEIGHT);
+    let size = Vec2::new(theme::content_width(ui), HISTOGRAM_HEIGHT);
     let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
     let label = format!("Histogram of {}", scale.name);
     response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, &label));

@@ -84,7 +84,7 @@ fn list(ui: &mut Ui, session: &mut Session) -> Option<Action> {
                 action = Some(ViewpointAction::Select((!is_selected).then_some(index)).into());
             }
             let mut values = (origin + place.as_dvec3()).to_array();
-            let width = (theme::SIDE_CONTENT_WIDTH - NUMBER_WIDTH - 3.0 * SPACE_XS) / 3.0;
+            let width = (theme::content_width(ui) - NUMBER_WIDTH - 3.0 * SPACE_XS) / 3.0;
             for (value, axis) in values.iter_mut().zip(["x", "y", "z"]) {
                 let field = DragValue::new(value)
                     .speed(speed)

@@ -95,7 +95,7 @@ fn switch(ui: &mut Ui, session: &Session) -> Option<Action> {
 
 /// Draws the histogram and moves the lines; says whether one was let go.
 fn histogram(ui: &mut Ui, votes: &SortedVotes, eta: &mut f32) -> bool {
-    let size = Vec2::new(theme::SIDE_CONTENT_WIDTH, HEIGHT);
+    let size = Vec2::new(theme::content_width(ui), HEIGHT);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, "Histogram of votes"));
     response.on_hover_text("How many points have which sum of votes; heights are square roots of the counts");

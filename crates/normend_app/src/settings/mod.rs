@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::command::Keymap;
 use crate::panels::side::SideTab;
+use crate::theme;
 use crate::viewport::NavigationSettings;
 pub use display::{DisplaySettings, HAIR_LENGTHS, HAIR_STEPS};
 pub use store::SettingsStore;
@@ -156,6 +157,8 @@ pub struct Settings {
     pub window: WindowPlace,
     /// What the side panel shows.
     pub side_tab: SideTab,
+    /// Width of the side panel, in points.
+    pub side_width: f32,
     /// The folder used last, for each purpose.
     pub folders: BTreeMap<Purpose, PathBuf>,
     /// Scans opened last, newest first, at most ten.
@@ -183,6 +186,7 @@ impl Default for Settings {
             navigation: NavigationSettings::default(),
             window: WindowPlace::default(),
             side_tab: SideTab::default(),
+            side_width: theme::SIDE_PANEL_WIDTH,
             folders: BTreeMap::new(),
             recent: Vec::new(),
             recent_commands: Vec::new(),
@@ -232,6 +236,7 @@ impl Settings {
         tame(&mut self.splat_scale, SPLAT_SCALES, default.splat_scale);
         self.display = self.display.into_sane();
         tame(&mut self.ui_scale, UI_SCALES, default.ui_scale);
+        tame(&mut self.side_width, theme::SIDE_PANEL_WIDTHS, default.side_width);
         if !self.window.size.iter().all(|side| WINDOW_SIDES.contains(side)) {
             self.window.size = default.window.size;
         }
