@@ -112,7 +112,7 @@ fn running(ui: &mut Ui, status: &crate::job::JobStatus) -> Option<Action> {
     ui.label(RichText::new(&status.stage).weak());
     ui.horizontal(|ui| {
         let bar = ProgressBar::new(status.fraction)
-            .desired_width(theme::SIDE_CONTENT_WIDTH - 90.0)
+            .desired_width(theme::content_width(ui) - 90.0)
             .desired_height(8.0);
         ui.add(bar).accessible_name("Looking for suspects");
         let button = ui.add_enabled(!status.cancelling, Button::new("Stop"));
@@ -210,7 +210,12 @@ fn row_ui(
             .truncate()
             .selectable(false),
     );
-    let small = |text: &str| RichText::new(text).small().weak();
+    let quiet = if is_focused {
+        ui.visuals().strong_text_color()
+    } else {
+        ui.visuals().weak_text_color()
+    };
+    let small = |text: &str| RichText::new(text).small().color(quiet);
     let mut taken_back = None;
     if standing == Standing::Accepted {
         text.horizontal(|ui| {
@@ -342,7 +347,7 @@ fn arguments(suspect: &Suspect) -> [Vec<String>; 2] {
     if suspect.kind != Kind::Whole {
         let seam = suspect.seam;
         if seam < -CLEAR_SEAM {
-            flip.push(format!("Neighbors look the other way (seam {seam:.2}).").replace('-', "−"));
+            flip.push(format!("Neighbors disagree (seam {seam:.2}).").replace('-', "−"));
         } else if seam > CLEAR_SEAM {
             keep.push(format!("It fits its surroundings (seam {seam:.2})."));
         }
