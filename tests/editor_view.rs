@@ -173,7 +173,10 @@ fn a_turned_patch_has_a_color_of_its_own_and_only_it_is_uploaded() {
     let n_turned = editor.app().document().unwrap().next_undo().unwrap().n_turned();
     assert!(n_turned > 0 && (n_turned as usize) < N_POINTS / 2);
     // Colors take 4 bytes a point; bits, highlights and the sphere of the source take little besides.
-    assert!(n_uploaded < 5 * n_turned + 2048, "{n_uploaded} bytes for {n_turned} points");
+    assert!(
+        n_uploaded < 5 * n_turned + 2048,
+        "{n_uploaded} bytes for {n_turned} points"
+    );
     let document = editor.app().document().unwrap();
     let names: BTreeSet<u32> = document.region_names(0..N_POINTS as u32).into_iter().collect();
     assert_eq!(names.len(), 2);

@@ -128,6 +128,8 @@ pub struct Comparing {
     /// The user asked for the next wrong region before the list was there.
     wants_next: Option<bool>,
     at_region: Option<usize>,
+    /// Wrong points are marked on the graphics adapter.
+    marks_wrong: bool,
     points_version: u64,
 }
 
@@ -150,6 +152,7 @@ impl Default for Comparing {
             regions_job: None,
             wants_next: None,
             at_region: None,
+            marks_wrong: false,
             points_version: 0,
         }
     }
@@ -396,6 +399,7 @@ impl App {
             {
                 judging.signs_revision = revision;
                 if became_new {
+                    comparing.marks_wrong = true;
                     if let Some(scene) = &mut self.scene {
                         scene.set_wrong(judging.live.wrong());
                     }
@@ -413,7 +417,8 @@ impl App {
                 let job = start_judging(&self.ctx, document, &propagation, reference, orientation);
                 comparing.judging_job = Some((version, orientation.clone(), job));
             }
-            (Some(_), None) | (None, None) => {
+            (_, None) if comparing.marks_wrong => {
+                comparing.marks_wrong = false;
                 if let Some(scene) = &mut self.scene {
                     scene.set_wrong(&FixedBitSet::new());
                 }

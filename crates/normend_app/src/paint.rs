@@ -283,10 +283,11 @@ impl App {
             *asked == request && (*asked_revision == revision || !coloring.depends_on_signs())
         });
         if !is_current && !is_asked && display.failed.as_ref() != Some(&request) {
-            let known = display
-                .painted
-                .as_ref()
-                .filter(|painted| painted.request.coloring == coloring && painted.request.column == request.column);
+            let known = display.painted.as_ref().filter(|painted| {
+                let is_same = painted.request.coloring == coloring && painted.request.column == request.column;
+                // What the file says holds under any parameters.
+                is_same && (coloring == Coloring::Scalar || painted.request.points_version == request.points_version)
+            });
             let values = known.and_then(|painted| painted.values.clone());
             let job = start(&self.ctx, session, &request, values, scene.uploader());
             display.job = Some((request, revision, job));
@@ -408,11 +409,7 @@ fn start(
 }
 
 impl Subject {
-    fn paint(
-        mut self,
-        request: &Request,
-        progress: &dyn Progress,
-    ) -> Result<Coat, JobError> {
+    fn paint(mut self, request: &Request, progress: &dyn Progress) -> Result<Coat, JobError> {
         let in_words = |error: ReadError| match error {
             ReadError::Cancelled(_) => JobError::Cancelled,
             error => JobError::Failed(format!("{error}.")),
