@@ -199,6 +199,34 @@ fn a_held_button_that_moves_away_is_a_drag_and_turns_nothing() {
 }
 
 #[test]
+fn the_patch_tool_selects_what_the_wheel_chose() {
+    let Some(mut editor) = start_with_patches() else { return };
+    let normals = editor.normals();
+    let selected = |app: &normend_app::App| app.document().unwrap().selected().len();
+    editor.key(Modifiers::NONE, Key::A);
+    let place = editor.app().view_rect().center();
+    editor.hover(place);
+    editor.wait("a patch", |app| app.patch_level().is_some());
+    assert_eq!(editor.app().n_would_turn(), None, "it turns nothing");
+    button(&mut editor, place, true, Modifiers::NONE);
+    button(&mut editor, place, false, Modifiers::NONE);
+    editor.wait("a selected patch", |app| selected(app) > 0);
+    let default = selected(editor.app());
+    let (level, _) = editor.app().patch_level().unwrap();
+    // No double-click.
+    editor.harness.run_steps(40);
+    button(&mut editor, place, true, Modifiers::SHIFT);
+    wheel(&mut editor, 1.0);
+    editor.wait("a larger patch", |app| {
+        app.patch_level().is_some_and(|(now, _)| now == level + 1)
+    });
+    button(&mut editor, place, false, Modifiers::SHIFT);
+    editor.wait("a larger selection", |app| selected(app) > default);
+    assert!(2 * selected(editor.app()) >= 3 * default);
+    assert_eq!((n_different(&normals, &editor.normals()), editor.n_sources()), (0, 0));
+}
+
+#[test]
 fn alt_mends_along_the_tree() {
     let Some(mut editor) = start_with_patches() else { return };
     let (place, patch) = editor.hover_wrong_patch();

@@ -12,9 +12,9 @@ use egui_kittest::kittest::Queryable;
 use glam::Vec3;
 use normend_app::command::Command;
 use normend_app::tools::Tool;
-use normend_core::PointSet;
+use normend_core::{PointSet, confidence};
 
-use driver::{Editor, N_POINTS, sphere_with_wrong_cap, start, start_scaled};
+use driver::{Editor, N_POINTS, sphere_with_wrong_cap, sphere_without_normals, start, start_scaled};
 
 const SHIFT_CTRL: Modifiers = Modifiers {
     shift: true,
@@ -324,7 +324,7 @@ fn a_polygon_is_clicked_mended_and_closed() {
             (0..3).all(|index| {
                 let (a, b) = (corners[index], corners[(index + 1) % 3]);
                 let across = (b - a).rot90().normalized();
-                (at - a).dot(across) * -1.0 > -reach
+                (at - a).dot(across) < reach
             })
         })
     };
@@ -338,7 +338,9 @@ fn a_polygon_is_clicked_mended_and_closed() {
     assert_eq!(selected(&editor), points);
     for last in [corners[0], corners[2]] {
         editor.key(SHIFT_CTRL, Key::A);
-        corners.map(|corner| click(&mut editor, corner));
+        for corner in corners {
+            click(&mut editor, corner);
+        }
         click(&mut editor, last);
         editor.wait("an answer to the polygon", |app| !app.is_selecting());
         assert_eq!(selected(&editor), points, "closed at {last:?}");
@@ -417,6 +419,60 @@ fn what_shows_its_back_is_selected_by_the_picture() {
 }
 
 #[test]
+fn pinned_and_undecided_points_are_selected_by_name() {
+    let Some(mut editor) = start(|folder| Some(sphere_without_normals(folder, "sphere.ply", 3000))) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    assert!(editor.app().availability(Command::SelectPinned).is_err());
+    let run = |editor: &mut Editor, words: &str| {
+        editor.key(Modifiers::COMMAND, Key::P);
+        editor.harness.run_steps(2);
+        editor.harness.event(Event::Text(words.to_owned()));
+        editor.harness.run_steps(2);
+        editor.key(Modifiers::NONE, Key::Enter);
+        editor.wait("an answer", |app| !app.is_selecting());
+        editor.harness.run_steps(2);
+    };
+    editor.key(Modifiers::NONE, Key::R);
+    let center = middle(&editor);
+    rectangle(&mut editor, center, Vec2::new(30.0, 30.0), Modifiers::NONE);
+    let pinned = selected(&editor);
+    editor.key(Modifiers::NONE, Key::P);
+    run(&mut editor, "undecided points");
+    let document = editor.app().document().unwrap();
+    let sure = confidence::confidence(document.propagation().unwrap()).unwrap();
+    let undecided = (0_u32..).zip(&sure).filter(|&(_, &sure)| sure <= confidence::UNDECIDED);
+    assert_eq!(selected(&editor), undecided.map(|(point, _)| point).collect());
+    run(&mut editor, "pinned points");
+    assert_eq!(selected(&editor), pinned);
+    assert!(editor.shows(&format!("{} selected", pinned.len())));
+}
+
+#[test]
+fn the_picture_follows_what_is_selected_through_undo_and_redo() {
+    let Some(mut editor) = oriented(1.0) else { return };
+    editor.hover(editor.app().view_rect().left_bottom() + Vec2::new(200.0, -8.0));
+    editor.harness.run_steps(10);
+    let plain = editor.picture().rgba;
+    editor.key(Modifiers::COMMAND, Key::A);
+    editor.harness.run_steps(3);
+    let all = editor.picture().rgba;
+    assert_ne!(all, plain);
+    editor.key(Modifiers::COMMAND, Key::Z);
+    editor.harness.run_steps(3);
+    assert_eq!(editor.picture().rgba, plain);
+    editor.key(SHIFT_CTRL, Key::Z);
+    editor.harness.run_steps(3);
+    assert_eq!(editor.picture().rgba, all);
+    // Another propagation puts the points in another order; the same ones are selected.
+    let propagation = editor.app().document().unwrap().propagation().unwrap().clone();
+    editor.harness.state_mut().show_propagation(propagation);
+    editor.harness.run_steps(5);
+    assert_eq!(editor.picture().rgba, all);
+}
+
+#[test]
 fn selecting_uploads_what_was_selected_alone() {
     let Some(mut editor) = oriented(1.0) else { return };
     editor.key(Modifiers::NONE, Key::B);
@@ -467,12 +523,12 @@ fn the_view_moves_while_a_tool_draws() {
 
 #[test]
 fn tools_are_chosen_by_buttons_and_keys() {
-    let Some(mut editor) = start(|_| None) else { return };
+    let Some(editor) = start(|_| None) else { return };
     assert!(
         editor.app().availability(Command::BrushTool).is_err(),
         "there is nothing to use it on"
     );
-    drop(editor.harness.step());
+    drop(editor);
     let Some(mut editor) = oriented(1.0) else { return };
     for tool in Tool::ALL {
         let name = tool.command().label();

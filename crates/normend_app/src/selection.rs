@@ -44,14 +44,17 @@ enum OfPicture {
     Backs,
 }
 
+/// A wish about what is seen.
+struct OfView {
+    of: OfPicture,
+    /// The picture from here is meant.
+    camera: Camera,
+    /// With the version of the ids it was asked with; `None` until there is a picture in full detail to ask.
+    request: Option<(IdsRequest, u64)>,
+}
+
 enum Wish {
-    Picture {
-        of: OfPicture,
-        /// The wish is about the picture from here.
-        camera: Camera,
-        /// With the version of the ids it was asked with; `None` until there is a picture in full detail to ask.
-        request: Option<(IdsRequest, u64)>,
-    },
+    View(Box<OfView>),
     Through {
         job: Job<PointSet>,
         combine: Combine,
@@ -136,11 +139,11 @@ impl Selecting {
     fn ask_picture(&mut self, scene: &Scene, viewport: &Viewport, of: OfPicture) {
         // Now, if it can be: the view may move on before earlier wishes are answered.
         let request = ask(scene, viewport, &of);
-        self.wishes.push_back(Wish::Picture {
+        self.wishes.push_back(Wish::View(Box::new(OfView {
             of,
             camera: *viewport.camera(),
             request,
-        });
+        })));
     }
 
     /// Asks for the selection to grow, or else to shrink, by about a splat.
@@ -173,7 +176,7 @@ impl Selecting {
     ) -> Option<Answer> {
         let mut wish = self.wishes.pop_front()?;
         let answer = match &mut wish {
-            Wish::Picture { of, camera, request } => poll_picture(scene, viewport, document, of, camera, request),
+            Wish::View(wish) => poll_view(scene, viewport, document, wish),
             Wish::Through { job, combine } => job.poll().map(|points| select(points, *combine)),
             Wish::Nothing => Some(select(Ok(PointSet::new()), Combine::Replace)),
             Wish::Undecided(job) => job.poll().map(|points| select(points, Combine::Replace)),
@@ -248,14 +251,8 @@ fn ask(scene: &Scene, viewport: &Viewport, of: &OfPicture) -> Option<(IdsRequest
     Some((scene.read_ids(min, size)?, scene.ids_version()))
 }
 
-fn poll_picture(
-    scene: &Scene,
-    viewport: &Viewport,
-    document: &Document,
-    of: &OfPicture,
-    camera: &Camera,
-    request: &mut Option<(IdsRequest, u64)>,
-) -> Option<Answer> {
+fn poll_view(scene: &Scene, viewport: &Viewport, document: &Document, wish: &mut OfView) -> Option<Answer> {
+    let OfView { of, camera, request } = wish;
     let (mut asked, version) = match request.take() {
         Some(asked) => asked,
         None if viewport.camera() != camera => {

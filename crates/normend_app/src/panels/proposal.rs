@@ -13,13 +13,14 @@ pub enum Reply {
     Leave,
 }
 
-/// The bar at the lower end of `area`: that `n_points` would turn, and the choice.
+/// The bar at the lower right of `area`: that `n_points` would turn, and the choice.
 pub fn ui(ui: &Ui, area: Rect, n_points: u64) -> Option<Reply> {
     let mut reply = None;
     Area::new(Id::unique("proposal"))
         .order(Order::Middle)
-        .pivot(Align2::CENTER_BOTTOM)
-        .fixed_pos(area.center_bottom() - Vec2::new(0.0, SPACE_L))
+        // At the right, because the axes are at the left.
+        .pivot(Align2::RIGHT_BOTTOM)
+        .fixed_pos(area.right_bottom() - Vec2::splat(SPACE_L))
         .show(ui.ctx(), |ui| {
             theme::card(ui).show(ui, |ui| {
                 ui.horizontal(|ui| {

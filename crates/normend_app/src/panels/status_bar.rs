@@ -120,5 +120,11 @@ fn facts(session: &Session) -> Vec<String> {
         "source",
         "sources",
     ));
+    let document = &session.document;
+    for (set, what) in [(document.selected(), "selected"), (document.hidden(), "hidden")] {
+        if !set.is_empty() {
+            facts.push(format!("{} {what}", theme::thousands(set.len())));
+        }
+    }
     facts
 }
