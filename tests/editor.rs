@@ -245,7 +245,7 @@ fn a_preset_votes_for_sources_that_clicks_overrule() {
         return;
     };
     editor.wait_until_oriented();
-    assert!(!editor.shows("voted for"));
+    assert!(!editor.shows("Drop Voted"));
     editor.click_button("Estimate");
     editor.choose("Preset", "Paper");
     assert!(editor.shows("Viewpoints") && editor.shows("Changed, not applied yet"));
@@ -255,7 +255,7 @@ fn a_preset_votes_for_sources_that_clicks_overrule() {
         !app.is_busy() && propagation.is_some_and(|propagation| !propagation.voted_sources.is_empty())
     });
     editor.open_tab(SideTab::Sources);
-    assert!(editor.shows("voted for"));
+    assert!(editor.shows("Drop Voted"));
     let document = editor.app().document().unwrap();
     assert!(document.sources().is_empty(), "voted sources are not the user's");
     assert_eq!(document.parameters().sources, SourceRule::HiddenPoints);
