@@ -83,6 +83,14 @@ fn gallery(choice: ThemeChoice, theme: &'static str) {
     gallery.run(Command::OpenSample);
     gallery.editor.wait_until_oriented();
 
+    gallery.shoot("mend_before");
+    let (place, _) = gallery.editor.hover_wrong_patch();
+    gallery.shoot("mend_hover");
+    gallery.editor.click(place);
+    gallery.editor.hover(gallery.place(0.95, 0.95));
+    gallery.shoot("mend_after");
+    gallery.run(Command::Undo);
+
     for tab in SideTab::ALL {
         gallery.editor.open_tab(tab);
         gallery.shoot(&format!("tab_{}", tab.label().to_lowercase()));
