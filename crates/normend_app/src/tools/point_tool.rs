@@ -382,3 +382,53 @@ pub fn points_of(document: &Document, change: &Change) -> PointSet {
     // Ascending, so that no point is looked for.
     points.into_iter().collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn badge(means: Means, shown: Result<(u64, u64, usize), EditError>) -> Option<String> {
+        let shown = shown.map(|(n_points, n_pinned, n_hindering)| Shown {
+            aim: Aim {
+                means,
+                deed: Deed::Select,
+                patch: None,
+                level: Some((3, 7)),
+            },
+            change: Change::from_flips(&[0..n_points as u32]),
+            n_pinned,
+            n_hindering,
+        });
+        let of = Previewed {
+            point: 0,
+            means,
+            revision: 0,
+            reach: Reach::default(),
+        };
+        let tool = PointTool {
+            preview: Some(Preview { of, shown }),
+            ..PointTool::default()
+        };
+        tool.badge()
+    }
+
+    #[test]
+    fn the_badge_says_what_a_click_does_and_what_it_does_not() {
+        assert_eq!(PointTool::default().badge(), None);
+        assert_eq!(
+            badge(Means::Patch, Ok((4812, 0, 0))).unwrap(),
+            "Turns 4,812 points (3 of 7)"
+        );
+        assert_eq!(
+            badge(Means::Patch, Ok((1, 120, 2))).unwrap(),
+            "Turns 1 point (3 of 7) · 120 pinned stay · larger patches hold 2 points you vouched for"
+        );
+        assert_eq!(
+            badge(Means::SelectPatch, Ok((2, 0, 0))).unwrap(),
+            "Patch of 2 points (3 of 7)"
+        );
+        let pinned = badge(Means::Patch, Err(EditError::Pinned { n_pinned: 1 })).unwrap();
+        assert!(pinned.starts_with("Pinned"), "{pinned}");
+        assert_eq!(badge(Means::Patch, Err(EditError::NotReady)), None);
+    }
+}
