@@ -175,6 +175,27 @@ fn lists_are_used_by_keyboard() {
     editor.key(Modifiers::NONE, Key::Escape);
     assert_eq!(theme(&editor), ThemeChoice::Dark);
     assert!(editor.shows("Interface size"));
+    // Down opens the closed list that has the focus, and then goes through it.
+    editor.harness.get_by_role_and_label(Role::ComboBox, "Theme").focus();
+    editor.harness.run_steps(2);
+    for modifiers in [Modifiers::NONE, Modifiers::ALT] {
+        editor.key(modifiers, Key::ArrowDown);
+        assert!(egui::Popup::is_any_open(&editor.harness.ctx), "{modifiers:?}");
+        editor.key(Modifiers::NONE, Key::ArrowDown);
+        assert!(editor.is_focused(Role::Button, ThemeChoice::System.label()));
+        editor.key(Modifiers::NONE, Key::Enter);
+        editor.harness.run_steps(2);
+        assert_eq!(theme(&editor), ThemeChoice::System);
+        assert!(editor.is_focused(Role::ComboBox, "Theme"));
+    }
+    // What is no list is left by the same key.
+    editor
+        .harness
+        .get_by_role_and_label(Role::CheckBox, "Reduce motion")
+        .focus();
+    editor.harness.run_steps(2);
+    editor.key(Modifiers::NONE, Key::ArrowDown);
+    assert!(!egui::Popup::is_any_open(&editor.harness.ctx));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::mpsc;
 
-use egui::{CentralPanel, Panel, ScrollArea, Ui};
+use egui::{CentralPanel, Panel, ScrollArea, Ui, UiBuilder};
 use normend_core::Document;
 use normend_render::{DrawSettings, SplatRenderer};
 
@@ -327,6 +327,9 @@ impl App {
             popup_keys::take(&self.ctx);
             return;
         }
+        if popup_keys::open_focused(&self.ctx) {
+            return;
+        }
         if self.windows.modal.is_some() {
             self.viewport.take_keys(&self.ctx, true);
             let escape = |input: &mut egui::InputState| input.consume_key(egui::Modifiers::NONE, egui::Key::Escape);
@@ -376,7 +379,8 @@ impl App {
         action
     }
 
-    fn side_panel(&mut self, ui: &mut Ui) -> Option<Action> {
+    /// The side panel, in a window that has `room` points for it and the view.
+    fn side_panel(&mut self, ui: &mut Ui, room: f32) -> Option<Action> {
         let blocked = self.availability(Command::Propagate).err();
         let propagating = matches!(self.work, Some(Work::Propagate { .. }));
         let session = self.session.as_mut()?;
@@ -387,7 +391,7 @@ impl App {
         let frame = egui::Frame::new()
             .fill(ui.visuals().panel_fill)
             .inner_margin(egui::Margin::symmetric(theme::SPACE_M as i8, theme::SPACE_M as i8));
-        let width = side::shown_width(settings.side_width, ui.available_width());
+        let width = side::shown_width(settings.side_width, room);
         Panel::right("side")
             .frame(frame)
             .resizable(false)
@@ -569,9 +573,17 @@ impl eframe::App for App {
 
         let mut actions = Vec::new();
         actions.extend(self.bars(ui));
-        actions.extend(self.side_panel(ui));
-        actions.extend(self.central(ui));
+        // The view is drawn before the panel beside it: Tab goes from the toolbar to the view, then to the panel.
+        let area = ui.available_rect_before_wrap();
+        let mut view = area;
+        if self.session.is_some() {
+            view.max.x -= side::shown_width(self.settings.settings.side_width, area.width());
+        }
+        let mut view_ui = ui.new_child(UiBuilder::new().id_salt("view").max_rect(view));
+        actions.extend(self.central(&mut view_ui));
+        actions.extend(self.side_panel(ui, area.width()));
         self.show_windows(ui);
+        popup_keys::note_focus(&self.ctx);
         for action in actions {
             self.act(action);
         }

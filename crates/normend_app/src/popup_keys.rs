@@ -2,8 +2,11 @@
 //!
 //! egui looks for the next widget in the whole window, also under the list, and nowhere while nothing has the focus, as
 //! after a click; and a list stays open when Enter has chosen from it. Here Up and Down go through the entries of the list
-//! that is open, Home and End to its ends, and Enter and the space bar close it, so that the focus is where it was.
+//! that is open, Home and End to its ends, and Enter and the space bar close it, so that the focus is where it was. Down
+//! also opens the list that has the focus, as elsewhere on the desktop.
 
+use egui::accesskit::Role;
+use egui::output::OutputEvent;
 use egui::{Context, Id, Key, LayerId, Modifiers, Order, Popup};
 
 /// The list and the pass in which a key chose from it, for the pass after it: only then it is known whether the choice
@@ -14,6 +17,42 @@ struct Chosen(Option<(LayerId, u64)>);
 /// What had the focus before the list.
 #[derive(Clone, Copy, Default)]
 struct Opener(Option<Id>);
+
+/// The list whose button got the focus last.
+#[derive(Clone, Copy, Default)]
+struct FocusedList(Option<Id>);
+
+/// Remembers at the end of a pass which list has the focus: egui says what a widget is only as it gets it.
+pub(crate) fn note_focus(ctx: &Context) {
+    let gained = ctx.output(|output| {
+        let mut events = output.events.iter().rev();
+        events.find_map(|event| match event {
+            OutputEvent::FocusGained(info) => Some(info.role),
+            _ => None,
+        })
+    });
+    if gained == Some(Role::ComboBox) {
+        let focused = ctx.memory(|memory| memory.focused());
+        ctx.data_mut(|data| data.insert_temp(Id::NULL, FocusedList(focused)));
+    }
+}
+
+/// Opens the list that has the focus when Down is pressed, with or without Alt; says whether it did.
+pub(crate) fn open_focused(ctx: &Context) -> bool {
+    let FocusedList(list) = ctx.data(|data| data.get_temp(Id::NULL)).unwrap_or_default();
+    let Some(list) = list.filter(|&list| ctx.memory(|memory| memory.has_focus(list))) else {
+        return false;
+    };
+    let is_pressed = ctx.input_mut(|input| {
+        input.consume_key(Modifiers::NONE, Key::ArrowDown) || input.consume_key(Modifiers::ALT, Key::ArrowDown)
+    });
+    if is_pressed {
+        // As egui names it, `ComboBox::widget_to_popup_id`.
+        Popup::open_id(ctx, list.with("popup"));
+        ctx.memory_mut(|memory| memory.move_focus(egui::FocusDirection::None));
+    }
+    is_pressed
+}
 
 /// Does in the topmost open popup what the pressed keys say. Choosing and Escape are egui's own.
 pub(crate) fn take(ctx: &Context) {
