@@ -41,8 +41,7 @@ pub fn ui(ui: &mut Ui, session: &Session, blocked: Option<&str>) -> Option<Actio
     }
     let idle = blocked.is_none() && components.status().is_none();
     ui.add_enabled_ui(idle, |ui| {
-        let chosen = buttons(ui, session).or_else(|| list(ui, session, propagation));
-        action = chosen.map(Action::from).or(action.take());
+        action = buttons(ui, session).map(Action::from).or(action.take());
         if components.len() > 1 {
             ui.horizontal(|ui| {
                 ui.spacing_mut().item_spacing.x = SPACE_XS;
@@ -53,6 +52,8 @@ pub fn ui(ui: &mut Ui, session: &Session, blocked: Option<&str>) -> Option<Actio
                 action = chosen.map(Action::from).or(action.take());
             });
         }
+        let chosen = list(ui, session, propagation);
+        action = chosen.map(Action::from).or(action.take());
     });
     action
 }
