@@ -27,6 +27,12 @@ fn scan_of(editor: &Editor) -> PathBuf {
     editor.folder.path().join("sphere.ply")
 }
 
+/// Leaves a picture of the window where a person can look at it.
+fn picture_of(editor: &mut Editor, name: &str) {
+    let picture = editor.harness.render().unwrap();
+    picture.save(Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)).unwrap();
+}
+
 /// Types a path into the open window with this field, and presses the button.
 fn type_path(editor: &mut Editor, field: &str, path: &Path, button: &str) {
     editor.harness.get_by_role_and_label(Role::TextInput, field).focus();
@@ -40,6 +46,7 @@ fn type_path(editor: &mut Editor, field: &str, path: &Path, button: &str) {
 
 fn save_recipe(editor: &mut Editor, path: &Path) {
     editor.key(Modifiers::COMMAND, Key::S);
+    picture_of(editor, "save_recipe.png");
     type_path(editor, "Save to", path, "Save");
     for _ in 0..1000 {
         if editor.said(&format!("Saved the recipe to {}", path.display())) {
@@ -93,10 +100,7 @@ fn edits_of_a_crash_are_offered_and_come_back_with_their_history() {
     assert!(editor.shows("Turn patch") || editor.shows("Mend"));
     assert!(editor.shows("Redo can bring back 1 edit that was undone."));
     assert_eq!(editor.n_sources(), 0);
-    let shown = editor.harness.render().unwrap();
-    shown
-        .save(Path::new(env!("CARGO_TARGET_TMPDIR")).join("restore.png"))
-        .unwrap();
+    picture_of(&mut editor, "restore.png");
     editor.click_button("Restore");
     editor.wait_until_oriented();
     assert!(editor.said("Restored 1 edit."));
@@ -183,6 +187,7 @@ fn what_is_exported_or_given_up_is_not_offered_and_what_is_kept_is() {
     editor.close();
     editor.harness.run_steps(2);
     assert!(editor.shows("Unsaved mends"));
+    picture_of(&mut editor, "unsaved.png");
     editor.click_button("Keep for next time");
     let mut editor = editor.crash_and_start(&scan);
     editor.wait_until_oriented();
@@ -222,10 +227,7 @@ fn edits_of_a_file_that_changed_are_never_applied() {
     editor.wait_until_oriented();
     assert!(editor.shows("The scan has changed"));
     assert!(editor.shows("4,000 points; now 3,000"));
-    let shown = editor.harness.render().unwrap();
-    shown
-        .save(Path::new(env!("CARGO_TARGET_TMPDIR")).join("restore_changed.png"))
-        .unwrap();
+    picture_of(&mut editor, "restore_changed.png");
     assert!(
         editor
             .harness
