@@ -410,7 +410,10 @@ fn a_part_is_flipped_isolated_selected_and_faces_me() {
 /// A scan of a scene from one place.
 fn scan_from_one_place(folder: &Path) -> Option<PathBuf> {
     let clouds = shapes::benchmark_clouds();
-    let cloud = clouds.iter().find(|cloud| cloud.name == "room_office_1_station").unwrap();
+    let cloud = clouds
+        .iter()
+        .find(|cloud| cloud.name == "room_office_1_station")
+        .unwrap();
     let positions = cloud.generate(&Silent).unwrap().shape.positions;
     let path = folder.join("scan.ply");
     normend_io::write_points(&path, Positions::Float(&positions), None, &Silent).unwrap();

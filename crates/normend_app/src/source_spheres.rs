@@ -1,6 +1,6 @@
 //! The spheres in the view: sources, pins, and points of other kinds that say a side.
 
-use normend_core::{PointSet, Start};
+use normend_core::{PointSet, Source, Start};
 use normend_render::Sphere;
 
 use crate::session::Session;
@@ -28,10 +28,17 @@ impl SourceSpheres {
         let mut all = Self::default();
         let (document, kinds) = (&session.document, &session.kinds);
         let sources = document.sources();
-        for source in sources
-            .iter()
-            .filter(|source| kinds.is_shown(SourceKind::of(source.origin)))
-        {
+        let is_of_rule = |source: &Source| SourceKind::of(source.origin) == SourceKind::Rule;
+        let n_of_rules = sources.iter().filter(|source| is_of_rule(source)).count();
+        let step = n_of_rules.div_ceil(MOST).max(1);
+        let mut rank = 0;
+        for source in sources.iter() {
+            // A rule for all parts makes as many sources as there are parts.
+            rank += usize::from(is_of_rule(source));
+            let is_left_out = is_of_rule(source) && rank % step != 0;
+            if is_left_out || !kinds.is_shown(SourceKind::of(source.origin)) {
+                continue;
+            }
             let color = if document.is_flipped(source) {
                 theme::SOURCE_FLIPPED
             } else {
