@@ -7,6 +7,7 @@
 #[path = "editor/driver.rs"]
 mod driver;
 
+use egui::accesskit::Role;
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2};
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
@@ -165,15 +166,17 @@ fn a_larger_brush_selects_more() {
 fn through_takes_what_lies_behind_and_visible_only_does_not() {
     let Some(mut editor) = oriented(1.0) else { return };
     editor.key(Modifiers::NONE, Key::R);
-    assert!(editor.shows("Visible only"));
+    assert!(editor.app().selects_visible_only());
     let (center, half) = (middle(&editor), Vec2::new(60.0, 50.0));
     rectangle(&mut editor, center, half, Modifiers::NONE);
     let visible = selected(&editor);
     assert!(!visible.is_empty());
     assert_eq!(n_in_front(&editor, &visible), visible.len() as usize);
 
-    editor.key(Modifiers::NONE, Key::V);
-    assert!(editor.shows("Through"));
+    let name = Command::VisibleOnly.label();
+    editor.harness.get_by_role_and_label(Role::CheckBox, name).click();
+    editor.harness.run_steps(2);
+    assert!(!editor.app().selects_visible_only());
     rectangle(&mut editor, center, half, Modifiers::NONE);
     let through = selected(&editor);
     let front = n_in_front(&editor, &through);
@@ -532,10 +535,7 @@ fn tools_are_chosen_by_buttons_and_keys() {
     let Some(mut editor) = oriented(1.0) else { return };
     for tool in Tool::ALL {
         let name = tool.command().label();
-        editor
-            .harness
-            .get_by_role_and_label(egui::accesskit::Role::RadioButton, name)
-            .click();
+        editor.harness.get_by_role_and_label(Role::RadioButton, name).click();
         editor.harness.run_steps(2);
         assert_eq!(editor.app().tool(), tool);
     }

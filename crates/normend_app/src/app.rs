@@ -213,6 +213,11 @@ impl App {
         self.tool
     }
 
+    /// Whether tools that draw select only what is seen.
+    pub fn selects_visible_only(&self) -> bool {
+        self.visible_only
+    }
+
     /// Whether the answer to a stroke or another wish for points is awaited.
     pub fn is_selecting(&self) -> bool {
         self.selecting.is_busy()

@@ -98,7 +98,7 @@ commands! {
     PatchTool: Select 0, "Patch tool", "Select patches with a click each; the wheel under a held button makes them larger or smaller",
         [key(Key::A)];
     ComponentTool: Select 0, "Component tool", "Select all that hangs together with a click", [key(Key::C)];
-    VisibleOnly: Select 0, "Visible only or through",
+    VisibleOnly: Select 0, "Visible only",
         "Let brush, lasso, rectangle and polygon select only what is seen, or also what lies behind it", [key(Key::V)];
     SelectAll: Select 1, "Select all", "Select every point that is shown", [ctrl(Key::A)];
     SelectNone: Select 1, "Select none", "Select no point", [ctrl_shift(Key::A)];

@@ -15,27 +15,36 @@ pub fn ui(ui: &mut Ui, tool: Option<Tool>, visible_only: bool) -> Option<Action>
     for offered in Tool::ALL {
         let command = offered.command();
         let is_active = tool == Some(offered);
-        if toggle(ui, tool.is_some(), is_active, offered.label(), command) {
+        if toggle(
+            ui,
+            tool.is_some(),
+            is_active,
+            offered.label(),
+            Role::RadioButton,
+            command,
+        ) {
             action = Some(command.into());
         }
     }
     ui.separator();
-    let label = if visible_only { "Visible only" } else { "Through" };
-    if toggle(ui, tool.is_some(), !visible_only, label, Command::VisibleOnly) {
-        action = Some(Command::VisibleOnly.into());
+    let command = Command::VisibleOnly;
+    if toggle(
+        ui,
+        tool.is_some(),
+        visible_only,
+        "Visible only",
+        Role::CheckBox,
+        command,
+    ) {
+        action = Some(command.into());
     }
     action
 }
 
 /// A button that stays down. To a screen reader it has the name of its command.
-fn toggle(ui: &mut Ui, enabled: bool, is_down: bool, label: &str, command: Command) -> bool {
+fn toggle(ui: &mut Ui, enabled: bool, is_down: bool, label: &str, role: Role, command: Command) -> bool {
     let response = ui.add_enabled(enabled, Button::selectable(is_down, label));
-    let name = if command == Command::VisibleOnly {
-        label
-    } else {
-        command.label()
-    };
-    response.widget_info(|| WidgetInfo::selected(Role::RadioButton, enabled, is_down, name));
+    response.widget_info(|| WidgetInfo::selected(role, enabled, is_down, command.label()));
     response
         .on_hover_text(command.tooltip_with_keys(ui.ctx()))
         .on_disabled_hover_text("No scan is open")
