@@ -191,12 +191,16 @@ fn wrong_points_are_marked_and_counted_with_every_edit() {
     assert_eq!(n_wrong(&editor), Some(0));
     leave_view(&mut editor);
     assert_eq!(editor.picture().count(is_ball), 0);
-    editor.wait("the regions", |app| app.comparing().regions().is_some_and(|(_, regions)| regions.is_empty()));
+    editor.wait("the regions", |app| {
+        app.comparing().regions().is_some_and(|(_, regions)| regions.is_empty())
+    });
     editor.harness.run_steps(2);
     assert!(editor.shows("No point is wrong"));
     editor.key(Modifiers::COMMAND, Key::Z);
     editor.wait_until_oriented();
-    editor.wait("the counts", |app| app.comparing().judged().is_some_and(|judged| judged.n_wrong() > 0));
+    editor.wait("the counts", |app| {
+        app.comparing().judged().is_some_and(|judged| judged.n_wrong() > 0)
+    });
     leave_view(&mut editor);
     assert!(editor.picture().count(is_ball) > 500);
     editor.click_button("Close reference");

@@ -17,7 +17,7 @@ use glam::Vec3;
 use normend_app::coloring::{self, Coloring};
 use normend_app::command::Action;
 use normend_app::panels::side::SideTab;
-use normend_core::shapes;
+use normend_core::{Preset, shapes};
 
 use driver::{Editor, Picture, is_back, is_front, sphere_with_wrong_cap, start_prepared};
 
@@ -117,6 +117,36 @@ fn what_is_not_known_cannot_be_shown_and_says_why() {
     assert!(editor.said("only the automatic method knows"));
     editor.harness.state_mut().act(Action::Display(Coloring::File));
     assert!(editor.said("the file has no colors"));
+}
+
+#[test]
+fn a_coloring_goes_when_other_parameters_take_away_what_it_shows() {
+    let Some(mut editor) = start(colored_sphere) else {
+        return;
+    };
+    show(&mut editor, Coloring::Confidence);
+    let propagate = |editor: &mut Editor, preset: Preset| {
+        editor.harness.state_mut().act(Action::Propagate(preset.parameters()));
+        editor.wait("the result", |app| {
+            !app.is_busy() && app.document().unwrap().parameters() == preset.parameters()
+        });
+        editor.harness.run_steps(3);
+    };
+    propagate(&mut editor, Preset::Tree);
+    assert_eq!(editor.app().display_mode(), Coloring::Facing);
+    show(&mut editor, Coloring::Scalar);
+    let before = editor.picture();
+    propagate(&mut editor, Preset::Auto);
+    assert_eq!(editor.app().display_mode(), Coloring::Scalar, "the file is the same");
+    editor.wait("the colors", |app| app.is_painted());
+    editor.harness.run_steps(3);
+    // The points are in another order on the graphics adapter now, and in the same colors.
+    let after = editor.picture();
+    let pairs = before.rgba.chunks_exact(4).zip(after.rgba.chunks_exact(4));
+    let is_near = |(a, b): &(&[u8], &[u8])| (0..3).all(|channel| a[channel].abs_diff(b[channel]) < 60);
+    let n_near = pairs.filter(is_near).count();
+    assert!(n_near > before.rgba.len() / 4 * 9 / 10, "{n_near} pixels are alike");
+    show(&mut editor, Coloring::Confidence);
 }
 
 #[test]

@@ -327,6 +327,7 @@ fn box_fields(ui: &mut Ui, cloud: &PointCloud, low: &mut Vec3, high: &mut Vec3) 
             ui.horizontal(|ui| {
                 ui.spacing_mut().item_spacing.x = SPACE_XS;
                 let mut ends = [low[axis], high[axis]].map(|value| f64::from(value) + origin[axis]);
+                let mut changed = false;
                 for (end, which) in ends.iter_mut().zip(["from", "to"]) {
                     let field = ui.add(DragValue::new(end).speed(speed).max_decimals(4));
                     field.widget_info(|| {
@@ -336,9 +337,12 @@ fn box_fields(ui: &mut Ui, cloud: &PointCloud, low: &mut Vec3, high: &mut Vec3) 
                             format!("Clip box {name} {which}"),
                         )
                     });
+                    changed |= field.changed();
                 }
-                let ends = ends.map(|end| (end - origin[axis]) as f32);
-                (low[axis], high[axis]) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+                if changed {
+                    let ends = ends.map(|end| (end - origin[axis]) as f32);
+                    (low[axis], high[axis]) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+                }
             });
             ui.end_row();
         }
