@@ -148,15 +148,18 @@ impl Session {
     /// may be due after it.
     ///
     /// # Errors
-    /// [`EditError`] when they do not fit the cloud; the edits before that are made, and the journal is left as it is.
+    /// [`EditError`] when they do not fit the cloud; the document is as it was opened then, not oriented, and the journal is left as it is.
     pub fn restore(&mut self, offer: Offer) -> Result<(), EditError> {
+        let before = self.document.parameters();
         self.begin_with(offer.reading.recipe.head.parameters);
         let (steps, n_done) = offer.reading.recipe.history();
-        for step in &steps {
-            self.make_again(step)?;
+        if let Err(error) = steps.iter().try_for_each(|step| self.make_again(step).map(drop)) {
+            let cloud = Arc::clone(&self.scan.cloud);
+            self.document = Document::new(cloud, self.scan.given_normals.clone()).with_parameters(before);
+            return Err(error);
         }
         for _ in n_done..steps.len() {
-            self.document.undo();
+            self.turned.extend(self.document.undo());
         }
         self.journal = Some(Journal::resume(offer));
         Ok(())

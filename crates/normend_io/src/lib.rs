@@ -299,8 +299,8 @@ impl Scan {
         self.file.path.as_ref()
     }
 
-    /// What tells this scan from others in recipes; `name` is the file's without folders. The first call hashes the file's bytes,
-    /// some gigabytes a second on all processors; later ones cost nothing.
+    /// What tells this scan from others in recipes; `name` is the file's without folders. The first call hashes the file's bytes
+    /// on all processors; later ones cost nothing.
     pub fn identity(&self, name: &str) -> ScanIdentity {
         let hash = || {
             *blake3::Hasher::new()
