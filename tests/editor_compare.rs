@@ -119,6 +119,35 @@ fn the_automatic_result_is_made_for_scans_that_kept_their_normals() {
 }
 
 #[test]
+fn the_input_is_shown_while_the_key_is_held() {
+    let Some(mut editor) = start() else { return };
+    orient(&mut editor);
+    editor.harness.key_down_modifiers(Modifiers::SHIFT, Key::K);
+    editor.wait("the input", |app| app.comparing().is_ready());
+    for _ in 0..60 {
+        // As keyboards do that are held.
+        editor.harness.event_modifiers(
+            egui::Event::Key {
+                key: Key::K,
+                physical_key: None,
+                pressed: true,
+                repeat: true,
+                modifiers: Modifiers::SHIFT,
+            },
+            Modifiers::SHIFT,
+        );
+        editor.harness.step();
+        assert!(editor.app().comparing().shows_other());
+    }
+    assert!(n_back(&editor) > 10_000, "{}", n_back(&editor));
+    editor.harness.key_up_modifiers(Modifiers::SHIFT, Key::K);
+    editor.harness.run_steps(4);
+    assert_eq!(editor.app().comparing().style, Style::Off);
+    leave_view(&mut editor);
+    assert!(n_back(&editor) < 10_000);
+}
+
+#[test]
 fn without_reduced_motion_both_are_shown_in_turn_and_no_faster_than_two_a_second() {
     let Some(mut editor) = start_prepared(
         1.0,

@@ -75,6 +75,8 @@ impl Other {
 
 /// Seconds that each is shown when they are shown in turn: one change in half a second is no flicker.
 pub const BLINK_SECS: f64 = 0.5;
+/// A key that is held longer compares for as long as it is held.
+const HOLD_SECS: f64 = 0.35;
 /// Wrong regions that are listed.
 const N_LISTED: usize = 20;
 /// Points of a reference may lie so far from the scan's, as a part of the scan's size: formats round.
@@ -115,6 +117,8 @@ pub struct Comparing {
     /// In turn: the other is shown now.
     shows_other: bool,
     switched_at: f64,
+    /// When the key was pressed that changed how they are shown, while it is held.
+    held_since: Option<f64>,
     shown: Option<(Other, u64)>,
     bits_job: Option<(Other, u64, Job<Vec<u32>>)>,
     /// What could not be had, so that it is not tried again for the same points.
@@ -141,6 +145,7 @@ impl Default for Comparing {
             split: 0.5,
             shows_other: false,
             switched_at: 0.0,
+            held_since: None,
             shown: None,
             bits_job: None,
             failed: None,
@@ -248,8 +253,19 @@ impl Comparing {
         self.switched_at = now;
     }
 
-    /// Goes on in time; returns the seconds until the next change. With `reduces_motion` nothing changes by itself.
-    pub fn tick(&mut self, now: f64, reduces_motion: bool) -> Option<f64> {
+    /// Goes on in time; returns the seconds until the next change. With `reduces_motion` nothing changes by itself. While a key is
+    /// held (`is_key_down`), the other stays.
+    pub fn tick(&mut self, now: f64, reduces_motion: bool, is_key_down: bool) -> Option<f64> {
+        if let Some(since) = self.held_since {
+            if is_key_down {
+                self.switched_at = now;
+                return None;
+            }
+            self.held_since = None;
+            if now - since >= HOLD_SECS {
+                (self.style, self.shows_other) = (Style::Off, false);
+            }
+        }
         if self.style != Style::Blink || reduces_motion || !self.is_ready() {
             return None;
         }
@@ -271,6 +287,11 @@ impl App {
         let now = self.ctx.input(|input| input.time);
         let reduces_motion = self.settings.settings.reduce_motion;
         let comparing = &mut self.comparing;
+        if comparing.held_since.is_some() {
+            // The key repeats.
+            return;
+        }
+        comparing.held_since = Some(now);
         if comparing.style == style {
             // Without motion each press shows the other; the third is the present again, and the end.
             if style == Style::Blink && reduces_motion && !comparing.shows_other {

@@ -208,8 +208,9 @@ impl App {
         let turned = turned.unwrap_or_default();
         self.keep_painted(&turned);
         self.keep_compared(&turned);
-        let now = self.ctx.input(|input| input.time);
-        if let Some(secs) = self.comparing.tick(now, self.settings.settings.reduce_motion) {
+        let (now, is_key_down) = self.ctx.input(|input| (input.time, !input.keys_down.is_empty()));
+        let reduces_motion = self.settings.settings.reduce_motion;
+        if let Some(secs) = self.comparing.tick(now, reduces_motion, is_key_down) {
             self.ctx.request_repaint_after(std::time::Duration::from_secs_f64(secs));
         }
         self.take_selected_values();

@@ -187,7 +187,7 @@ commands! {
     ToggleSpheres: View 7, "Sources as spheres", "Show sources as spheres, or hide them", [shift(Key::I)];
     CompareSplit: View 8, "Compare side by side",
         "Show the input, the automatic result or a reference left of a line, and the present right of it", [key(Key::K)];
-    CompareBlink: View 8, "Compare in turn", "Show the other and the present in turn", [shift(Key::K)];
+    CompareBlink: View 8, "Compare in turn", "Show the other and the present in turn; or the other for as long as the key is held", [shift(Key::K)];
     NextWrong: View 8, "Next wrong region", "Fly to the next region that is wrong against the reference", [key(Key::W)];
     PreviousWrong: View 8, "Previous wrong region",
         "Fly to the region before that is wrong against the reference", [shift(Key::W)];
