@@ -137,7 +137,7 @@ impl Editor {
             let label = row.accesskit_node().label();
             label.is_some_and(|label| label.starts_with(text))
         };
-        let row = self.harness.query_all_by_role(Role::Button).filter(begins).last();
+        let row = self.harness.query_all_by_role(Role::Button).rfind(begins);
         row.unwrap_or_else(|| panic!("no row begins with {text}")).click();
         self.harness.run_steps(2);
     }
