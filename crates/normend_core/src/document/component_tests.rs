@@ -32,7 +32,7 @@ fn document(world: &World, voted: &BTreeMap<u32, bool>) -> Document {
     let is_pair = |pair: &[u32]| tree.parent(pair[1]) == Some(pair[0]);
     let positions: Vec<u32> = (0..world.n_points as u32).collect();
     // Pairs of parent and child in preorder are patches, where all positions pair up like that.
-    let has_pairs = world.n_points % 2 == 0 && positions.chunks(2).all(is_pair);
+    let has_pairs = world.n_points.is_multiple_of(2) && positions.chunks(2).all(is_pair);
     let of_point: Vec<u32> = (0..world.n_points as u32)
         .map(|point| pairs[tree.position(point) as usize])
         .collect();
