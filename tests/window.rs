@@ -386,6 +386,43 @@ fn a_crash_leaves_a_report_that_the_next_start_names() {
 }
 
 #[test]
+fn work_that_panics_leaves_a_report_and_the_editor() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    normend(folder, "generate part -o scan.ply --points 2000");
+    if !can_run(folder, "scan.ply") {
+        return;
+    }
+    let display = Display::start(folder);
+    let log = || fs::read_to_string(folder.join("log")).unwrap();
+    let mut command = editor(folder, &display);
+    let mut editor = Killed(command.env("NORMEND_PANIC", "work").arg("scan.ply").spawn().unwrap());
+    display.wait_for("the message", |_| {
+        log().contains("An internal error stopped this work").then_some(())
+    });
+    display.wait_for_rest();
+    let report = fs::read_dir(folder.join("state"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .find(|path| path.file_name().unwrap().to_string_lossy().starts_with("work-"))
+        .unwrap();
+    assert!(
+        log().contains(&format!("A report is at {}", report.display())),
+        "{}",
+        log()
+    );
+    let text = fs::read_to_string(report).unwrap();
+    assert!(
+        text.contains("had to stop some work") && text.contains("this panic was asked for"),
+        "{text}"
+    );
+    display.xdotool(&["search", "--onlyvisible", "--name", "Normend", "windowfocus", "--sync"]);
+    display.xdotool(&["key", "ctrl+q"]);
+    let status = display.wait_for("the end of the editor", |_| editor.0.try_wait().unwrap());
+    assert!(status.success(), "{}", log());
+}
+
+#[test]
 fn a_wrong_patch_is_mended_in_the_window() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

@@ -28,6 +28,7 @@ use crate::selection::Selecting;
 use crate::session::Session;
 use crate::settings::{SettingsStore, WindowPlace};
 use crate::suspect_pictures::SuspectPictures;
+use crate::suspects_list::Standing;
 use crate::theme;
 use crate::tools::Tool;
 use crate::tools::painting::Painting;
@@ -487,12 +488,20 @@ impl App {
 
     /// The hint that is due, if any; what the user has done by himself needs no hint any more.
     fn show_hint(&mut self, ui: &Ui, area: egui::Rect) {
+        // The card that asks for an answer stands where the hint would.
+        if self.proposal.is_some() {
+            return;
+        }
         let document = self.document();
         let propagation = document.and_then(Document::propagation);
+        let is_open = self.settings.settings.side_tab == SideTab::Suspects;
         let progress = hints::Progress {
             is_oriented: propagation.is_some() && self.work.is_none(),
-            is_mended: document.and_then(Document::next_undo).is_some(),
+            n_steps: document.map_or(0, Document::n_done),
             has_patches: propagation.is_some_and(|propagation| propagation.patches.is_some()),
+            lists_suspects: is_open && self.suspects().is_some_and(|list| list.count(Standing::Open) > 0),
+            is_selecting: self.tool != Tool::default(),
+            is_journaled: self.session.as_ref().is_some_and(Session::is_kept),
         };
         let dismissed = &mut self.settings.settings.dismissed_hints;
         if let Some(card) = hints::due(dismissed, progress)

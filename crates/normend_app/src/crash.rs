@@ -22,10 +22,66 @@ const N_REPORTS: usize = 10;
 const RESTARTED_VARIABLE: &str = "NORMEND_RESTARTED";
 /// Asks for a loss of the graphics device, see [`is_loss_asked_for`].
 const LOSE_VARIABLE: &str = "NORMEND_LOSE_DEVICE";
-/// Asks for a panic, see [`is_panic_asked_for`].
+/// Asks for a panic, see [`is_panic_asked_for`] and [`is_work_panic_asked_for`].
 const PANIC_VARIABLE: &str = "NORMEND_PANIC";
 /// An editor that came up again and is lost within this time would be lost again.
 const SHORTEST_RUN: Duration = Duration::from_secs(15);
+
+/// What a report says before it names whether edits are kept.
+const EDITS_LINE: &str = "Edits: ";
+
+/// What becomes of the edits when the editor stops now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Edits {
+    /// There are none that no exported file has.
+    None,
+    /// They are in the journal.
+    Kept,
+    /// The journal cannot be written.
+    Lost,
+}
+
+impl Edits {
+    const ALL: [Self; 3] = [Self::None, Self::Kept, Self::Lost];
+
+    /// In a report.
+    fn words(self) -> &'static str {
+        match self {
+            Self::None => "none that are not exported",
+            Self::Kept => "kept in the journal",
+            Self::Lost => "not kept, the journal cannot be written",
+        }
+    }
+}
+
+/// What a panic ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ends {
+    /// The editor.
+    Editor,
+    /// Work beside the window, which the editor outlives.
+    Work,
+}
+
+impl Ends {
+    /// What the names of its reports begin with.
+    fn prefix(self) -> &'static str {
+        match self {
+            Self::Editor => "crash-",
+            Self::Work => "work-",
+        }
+    }
+}
+
+/// A report that the user was not told of yet.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct News {
+    /// The file's name.
+    pub(crate) name: String,
+    pub(crate) path: PathBuf,
+    /// What became of the edits; `None` when the report does not say.
+    pub(crate) edits: Option<Edits>,
+}
 
 /// What is known of the run.
 #[derive(Debug)]
@@ -38,6 +94,9 @@ struct Run {
     started: Option<Instant>,
     /// The graphics device is gone, and why.
     lost: Option<String>,
+    edits: Edits,
+    /// The report of work that panicked, until the user is told of it.
+    of_work: Option<PathBuf>,
 }
 
 static RUN: Mutex<Run> = Mutex::new(Run {
@@ -46,6 +105,8 @@ static RUN: Mutex<Run> = Mutex::new(Run {
     scan: None,
     started: None,
     lost: None,
+    edits: Edits::None,
+    of_work: None,
 });
 
 fn run() -> MutexGuard<'static, Run> {
@@ -71,6 +132,11 @@ pub(crate) fn start(adapter: &str) {
 /// Keeps which scan is open, for [`restart`].
 pub(crate) fn set_scan(scan: Option<&Path>) {
     run().scan = scan.map(Path::to_path_buf);
+}
+
+/// Keeps what becomes of the edits when the editor stops now.
+pub(crate) fn set_edits(edits: Edits) {
+    run().edits = edits;
 }
 
 /// The graphics device is gone; `reason` is what the driver says.
@@ -103,7 +169,12 @@ pub(crate) fn leave_lost() -> ! {
 
 /// Whether this editor shall panic when its window comes up: so reports can be tried out.
 pub(crate) fn is_panic_asked_for() -> bool {
-    std::env::var_os(PANIC_VARIABLE).is_some()
+    std::env::var_os(PANIC_VARIABLE).is_some_and(|wanted| wanted != "work")
+}
+
+/// Whether all work beside the window shall panic.
+pub(crate) fn is_work_panic_asked_for() -> bool {
+    std::env::var_os(PANIC_VARIABLE).is_some_and(|wanted| wanted == "work")
 }
 
 /// Whether this editor shall lose its graphics device once it shows a scan: so the way back can be tried out.
@@ -144,25 +215,39 @@ fn restart_into(scan: Option<&Path>) -> io::Result<()> {
 }
 
 /// Writes a report of a panic while the window is up. `None` when there is nothing to write it for, or nowhere.
-pub(crate) fn report(panic: &str) -> Option<PathBuf> {
+pub(crate) fn report(panic: &str, ends: Ends) -> Option<PathBuf> {
     // A panic while this very state is held must not wait for itself.
-    let run = RUN.try_lock().ok()?;
+    let mut run = RUN.try_lock().ok()?;
     run.started?;
     let folder = folders::state_folder()?;
-    write_report(&folder, &run, panic, &jiff::Zoned::now()).ok()
+    let file = write_report(&folder, &run, panic, ends, &jiff::Zoned::now()).ok()?;
+    if ends == Ends::Work {
+        run.of_work = Some(file.clone());
+    }
+    Some(file)
 }
 
-fn write_report(folder: &Path, run: &Run, panic: &str, now: &jiff::Zoned) -> io::Result<PathBuf> {
+/// The report of work that panicked, once.
+pub(crate) fn take_report_of_work() -> Option<PathBuf> {
+    run().of_work.take()
+}
+
+fn write_report(folder: &Path, run: &Run, panic: &str, ends: Ends, now: &jiff::Zoned) -> io::Result<PathBuf> {
     fs::create_dir_all(folder)?;
-    let file = folder.join(format!("crash-{}.txt", now.strftime("%Y-%m-%d-%H%M%S")));
+    let file = folder.join(format!("{}{}.txt", ends.prefix(), now.strftime("%Y-%m-%d-%H%M%S")));
+    let what = match ends {
+        Ends::Editor => "closed unexpectedly",
+        Ends::Work => "had to stop some work",
+    };
     let secs = run.started.map_or(0, |started| started.elapsed().as_secs());
     let mut text = format!(
-        "Normend {} closed unexpectedly.\n\nTime: {}\nSystem: {} ({})\nGraphics: {}\nRan for: {secs} s\n",
+        "Normend {} {what}.\n\nTime: {}\nSystem: {} ({})\nGraphics: {}\nRan for: {secs} s\n{EDITS_LINE}{}\n",
         env!("CARGO_PKG_VERSION"),
         now.strftime("%Y-%m-%d %H:%M:%S %:z"),
         std::env::consts::OS,
         std::env::consts::ARCH,
         run.adapter,
+        run.edits.words(),
     );
     if let Some(reason) = &run.lost {
         text += &format!("Graphics device lost: {reason}\n");
@@ -173,7 +258,7 @@ fn write_report(folder: &Path, run: &Run, panic: &str, now: &jiff::Zoned) -> io:
     }
     text += &format!("\nBacktrace:\n{}\n", Backtrace::force_capture());
     fs::write(&file, without_home(text))?;
-    for old in reports(folder).into_iter().rev().skip(N_REPORTS) {
+    for old in reports(folder, ends).into_iter().rev().skip(N_REPORTS) {
         // It is only one too many; the next report tries again.
         let _ = fs::remove_file(folder.join(old));
     }
@@ -190,29 +275,34 @@ fn without_home(text: String) -> String {
     }
 }
 
-/// The names of the reports in `folder`, oldest first.
-fn reports(folder: &Path) -> Vec<String> {
+/// The names of the reports of one kind in `folder`, oldest first.
+fn reports(folder: &Path, of: Ends) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(folder)
         .into_iter()
         .flatten()
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-        .filter(|name| name.starts_with("crash-") && name.ends_with(".txt"))
+        .filter(|name| name.starts_with(of.prefix()) && name.ends_with(".txt"))
         .collect();
     // Their names are dates.
     names.sort();
     names
 }
 
-/// The newest report, unless it is `told` or older: its name and its path.
-pub(crate) fn news(told: &str) -> Option<(String, PathBuf)> {
+/// The newest report of a crash, unless it is `told` or older.
+pub(crate) fn news(told: &str) -> Option<News> {
     let folder = folders::state_folder()?;
     news_in(&folder, told)
 }
 
-fn news_in(folder: &Path, told: &str) -> Option<(String, PathBuf)> {
-    let newest = reports(folder).pop().filter(|name| name.as_str() > told)?;
-    let path = folder.join(&newest);
-    Some((newest, path))
+fn news_in(folder: &Path, told: &str) -> Option<News> {
+    let name = reports(folder, Ends::Editor)
+        .pop()
+        .filter(|name| name.as_str() > told)?;
+    let path = folder.join(&name);
+    let text = fs::read_to_string(&path).unwrap_or_default();
+    let words = text.lines().find_map(|line| line.strip_prefix(EDITS_LINE));
+    let edits = Edits::ALL.into_iter().find(|edits| words == Some(edits.words()));
+    Some(News { name, path, edits })
 }
 
 #[cfg(test)]
@@ -226,6 +316,8 @@ mod tests {
             scan: None,
             started: Some(Instant::now()),
             lost: Some("destroyed".to_owned()),
+            edits: Edits::Kept,
+            of_work: None,
         }
     }
 
@@ -234,7 +326,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         assert_eq!(news_in(folder.path(), ""), None);
         let now: jiff::Zoned = "2026-11-22T14:03:59+01:00[Europe/Berlin]".parse().unwrap();
-        let file = write_report(folder.path(), &a_run(), "panicked at src/x.rs:1:1:\nno luck", &now).unwrap();
+        let file = {
+            let panic = "panicked at src/x.rs:1:1:\nno luck";
+            write_report(folder.path(), &a_run(), panic, Ends::Editor, &now).unwrap()
+        };
         let text = fs::read_to_string(&file).unwrap();
         for part in [
             env!("CARGO_PKG_VERSION"),
@@ -248,9 +343,30 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part}: {text}");
         }
-        let (name, path) = news_in(folder.path(), "").unwrap();
-        assert_eq!((name.as_str(), &path), ("crash-2026-11-22-140359.txt", &file));
-        assert_eq!(news_in(folder.path(), &name), None);
+        let news = news_in(folder.path(), "").unwrap();
+        assert_eq!((news.name.as_str(), &news.path), ("crash-2026-11-22-140359.txt", &file));
+        assert_eq!(news.edits, Some(Edits::Kept));
+        assert_eq!(news_in(folder.path(), &news.name), None);
+    }
+
+    #[test]
+    fn the_next_editor_hears_what_became_of_the_edits_but_not_of_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let now: jiff::Zoned = "2026-11-22T14:03:59+01:00[Europe/Berlin]".parse().unwrap();
+        let file = write_report(folder.path(), &a_run(), "no luck", Ends::Work, &now).unwrap();
+        let text = fs::read_to_string(file).unwrap();
+        assert!(
+            text.contains("had to stop some work") && !text.contains("closed"),
+            "{text}"
+        );
+        assert_eq!(news_in(folder.path(), ""), None, "the editor went on");
+        for edits in Edits::ALL {
+            let run = Run { edits, ..a_run() };
+            write_report(folder.path(), &run, "", Ends::Editor, &now).unwrap();
+            assert_eq!(news_in(folder.path(), "").unwrap().edits, Some(edits));
+        }
+        fs::write(folder.path().join("crash-2026-11-22-140359.txt"), "of an older editor").unwrap();
+        assert_eq!(news_in(folder.path(), "").unwrap().edits, None);
     }
 
     #[test]
@@ -259,9 +375,9 @@ mod tests {
         let first: jiff::Zoned = "2026-01-01T00:00:00+00:00[UTC]".parse().unwrap();
         for minute in 0..(N_REPORTS as i64 + 3) {
             let now = &first + jiff::SignedDuration::from_mins(minute);
-            write_report(folder.path(), &a_run(), "", &now).unwrap();
+            write_report(folder.path(), &a_run(), "", Ends::Editor, &now).unwrap();
         }
-        let names = reports(folder.path());
+        let names = reports(folder.path(), Ends::Editor);
         assert_eq!(names.len(), N_REPORTS);
         assert_eq!(names[0], "crash-2026-01-01-000300.txt");
     }

@@ -11,6 +11,8 @@ use std::time::Instant;
 
 use normend_core::{Cancelled, Progress};
 
+use crate::crash;
+
 /// Why a job gave no result.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum JobError {
@@ -76,7 +78,13 @@ impl<T: Send + 'static> Job<T> {
         let progress = Arc::clone(&shared);
         let failure = sender.clone();
         let spawned = thread::Builder::new().name(format!("normend {name}")).spawn(move || {
-            let outcome = catch_unwind(AssertUnwindSafe(|| work(progress.as_ref())))
+            let work = || {
+                if crash::is_work_panic_asked_for() {
+                    std::panic::panic_any("this panic was asked for");
+                }
+                work(progress.as_ref())
+            };
+            let outcome = catch_unwind(AssertUnwindSafe(work))
                 .unwrap_or_else(|panic| Err(JobError::Failed(in_words(panic.as_ref()))));
             // Nobody listens when the job was dropped meanwhile; then the result is not wanted.
             let _ = sender.send(outcome);
@@ -159,7 +167,10 @@ fn in_words(panic: &(dyn std::any::Any + Send)) -> String {
         .map(|text| (*text).to_owned())
         .or_else(|| panic.downcast_ref::<String>().cloned())
         .unwrap_or_else(|| "no reason given".to_owned());
-    format!("An internal error stopped this work ({reason}). Your scan and mends are unchanged.")
+    let report = crash::take_report_of_work()
+        .map(|path| format!(" A report is at {}.", path.display()))
+        .unwrap_or_default();
+    format!("An internal error stopped this work ({reason}). Your scan and mends are unchanged.{report}")
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use normend_io::recipe::{self, End, Recipe};
 
 use crate::app::App;
 use crate::command::Action;
+use crate::crash::{self, Edits};
 use crate::job::{Job, JobError};
 use crate::journal::found::{self, Findings, Offer};
 use crate::journal::{News, RETRY_DELAY};
@@ -100,6 +101,16 @@ impl App {
                 self.ctx.request_repaint_after(RETRY_DELAY);
             }
         }
+        crash::set_edits(match &self.session {
+            Some(session) if session.is_unsaved() => {
+                if session.is_kept() {
+                    Edits::Kept
+                } else {
+                    Edits::Lost
+                }
+            }
+            _ => Edits::None,
+        });
         let has_offers = self.session.as_ref().is_some_and(|session| !session.offers.is_empty());
         if has_offers && self.windows.modal.is_none() && self.recipe_job.is_none() {
             self.windows.modal = Some(Modal::Restore);
@@ -151,7 +162,7 @@ impl App {
         match session.restore(offer) {
             Ok(()) => self.messages.info(format!("Restored {n_edits}.")),
             Err(error) => self.messages.error(format!(
-                "Not all edits were restored: {error}. Their journal stays as it is."
+                "The edits were not restored: {error}. Their journal stays as it is."
             )),
         }
         if let Some(damage) = damage {

@@ -9,7 +9,7 @@ use eframe::egui_wgpu::{WgpuConfiguration, WgpuSetupCreateNew};
 use normend_render::SplatRenderer;
 
 use crate::app::App;
-use crate::crash::{self, DeviceLost};
+use crate::crash::{self, DeviceLost, Ends};
 use crate::settings::{SettingsStore, WindowPlace};
 
 const MIN_SIZE: [f32; 2] = [900.0, 600.0];
@@ -30,10 +30,10 @@ struct Seen {
 /// In words for the user: no display, no graphics driver, and the package that gives it.
 pub fn run(scan: Option<PathBuf>, restores: bool) -> anyhow::Result<()> {
     let (mut settings, problem) = SettingsStore::load();
-    let news = crash::news(&settings.settings.told_crash).map(|(name, path)| {
-        settings.settings.told_crash = name;
-        path
-    });
+    let news = crash::news(&settings.settings.told_crash);
+    if let Some(news) = &news {
+        settings.settings.told_crash.clone_from(&news.name);
+    }
     let options = options(settings.settings.window);
     // Missing libraries of the window system are panics of its bindings; they become words like all other errors.
     let seen = Arc::new(Mutex::new(Seen::default()));
@@ -85,11 +85,18 @@ pub fn run(scan: Option<PathBuf>, restores: bool) -> anyhow::Result<()> {
     }
 }
 
-/// What the panic hook does: jobs turn their own panics into messages, the window's thread is done for.
+/// What the panic hook does: jobs turn their own panics into messages and get a report, the window's thread is done for.
 fn see(seen: &Mutex<Seen>, panic: &str) {
     tracing::error!("{panic}");
+    if std::thread::current().name() != Some("main") {
+        if !crash::is_loss(panic) {
+            // Where it lies is said with the job's own message; without a report that says the reason alone.
+            let _ = crash::report(panic, Ends::Work);
+        }
+        return;
+    }
     let mut seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
-    if std::thread::current().name() != Some("main") || seen.panic.is_some() {
+    if seen.panic.is_some() {
         return;
     }
     seen.panic = Some(panic.to_owned());
@@ -97,7 +104,7 @@ fn see(seen: &Mutex<Seen>, panic: &str) {
         // At once: giving up what belonged to the device may stop the process.
         seen.restarted = Some(crash::restart());
     } else {
-        seen.report = crash::report(panic);
+        seen.report = crash::report(panic, Ends::Editor);
     }
 }
 

@@ -123,6 +123,11 @@ impl Session {
         self.is_unsaved() && self.document.steps().take(self.document.n_done()).any(mends)
     }
 
+    /// Whether the edits are in a journal, so that a crash does not lose them.
+    pub fn is_kept(&self) -> bool {
+        (self.journal.as_ref()).is_some_and(|journal| journal.is_kept() && journal.path().is_some())
+    }
+
     /// Remembers that the signs of `revision` are in an exported file.
     pub fn mark_saved(&mut self, revision: u64) {
         self.saved_revision = revision;

@@ -1,12 +1,10 @@
 //! The windows over the editor: which are open, what their answers do, and what Escape closes.
 
-use std::path::PathBuf;
-
 use egui::Ui;
 
 use crate::app::App;
 use crate::command::{Action, Command};
-use crate::crash;
+use crate::crash::{self, Edits};
 use crate::journal::Journal;
 use crate::panels::modal::Modal;
 use crate::panels::preferences::Preferences;
@@ -38,16 +36,21 @@ impl Windows {
 }
 
 impl App {
-    /// The window is up. Says what became of the last one: `report` is of a crash that the user was not told of yet.
-    pub(crate) fn say_what_happened(&mut self, report: Option<PathBuf>) {
+    /// The window is up. Says what became of the last one: `news` is of a crash that the user was not told of yet.
+    pub(crate) fn say_what_happened(&mut self, news: Option<crash::News>) {
         crash::start(&self.adapter);
         if crash::is_panic_asked_for() {
             std::panic::panic_any("this panic was asked for");
         }
-        if let Some(report) = report {
+        if let Some(news) = news {
+            let edits = match news.edits {
+                Some(Edits::Kept) => " Your edits are kept: open the scan again.",
+                Some(Edits::Lost) => " The edits since the last export are lost: their journal could not be written.",
+                Some(Edits::None) | None => "",
+            };
             self.messages.error(format!(
-                "Normend closed unexpectedly the last time. Your edits are kept: open the scan again. A report is at {}.",
-                report.display()
+                "Normend closed unexpectedly the last time.{edits} A report is at {}.",
+                news.path.display()
             ));
         }
         if crash::was_restarted() {

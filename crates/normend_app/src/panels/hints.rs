@@ -5,9 +5,18 @@ use std::collections::BTreeSet;
 use egui::{Align, Align2, Area, Button, Id, Label, Layout, Order, Rect, RichText, Ui, Vec2};
 
 use crate::command::Command;
-use crate::theme::{self, SPACE_M, SPACE_S};
+use crate::theme::{self, SPACE_L, SPACE_M, SPACE_S};
+use crate::viewport::GIZMO_WIDTH;
 
+/// In points.
 const WIDTH: f32 = 300.0;
+/// Narrower the words stand in a column of single words; then there is no card. In points.
+const MIN_WIDTH: f32 = 180.0;
+/// Edits after which the next hint comes: one at a time, not all after the first.
+const N_BEFORE_JOURNAL: usize = 2;
+const N_BEFORE_HISTORY: usize = 3;
+const N_BEFORE_TOOLS: usize = 4;
+const N_BEFORE_FACE_ME: usize = 6;
 
 /// One hint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,6 +29,16 @@ pub enum Card {
     Size,
     /// How to find everything else.
     Find,
+    /// How to step through what is suspected.
+    Suspects,
+    /// How to choose points by hand.
+    Tools,
+    /// That edits survive a crash.
+    Journal,
+    /// How to go back.
+    History,
+    /// How to turn all that is in sight.
+    FaceMe,
 }
 
 /// What the user has come to.
@@ -27,15 +46,32 @@ pub enum Card {
 pub struct Progress {
     /// The open scan is oriented.
     pub is_oriented: bool,
-    /// It was mended at least once.
-    pub is_mended: bool,
+    /// Edits that undo can take back.
+    pub n_steps: usize,
     /// There are patches to choose from.
     pub has_patches: bool,
+    /// The list of suspects is open and has some that are not settled.
+    pub lists_suspects: bool,
+    /// A tool that draws or paints is chosen.
+    pub is_selecting: bool,
+    /// Edits are written into a journal.
+    pub is_journaled: bool,
 }
 
 impl Card {
     /// All hints, in the order they come.
-    pub const ALL: [Self; 4] = [Self::Look, Self::Point, Self::Size, Self::Find];
+    pub const ALL: [Self; 9] = [
+        Self::Look,
+        // These are about what the user has just opened.
+        Self::Suspects,
+        Self::Tools,
+        Self::Point,
+        Self::Size,
+        Self::Find,
+        Self::Journal,
+        Self::History,
+        Self::FaceMe,
+    ];
 
     /// The name in the settings.
     pub fn name(self) -> &'static str {
@@ -44,6 +80,11 @@ impl Card {
             Self::Point => "point",
             Self::Size => "size",
             Self::Find => "find",
+            Self::Suspects => "suspects",
+            Self::Tools => "tools",
+            Self::Journal => "journal",
+            Self::History => "history",
+            Self::FaceMe => "face_me",
         }
     }
 
@@ -53,6 +94,11 @@ impl Card {
             Self::Point => "Mend with a click",
             Self::Size => "More or less at once",
             Self::Find => "Everything else",
+            Self::Suspects => "From suspect to suspect",
+            Self::Tools => "Choose points by hand",
+            Self::Journal => "Nothing gets lost",
+            Self::History => "Back and forth",
+            Self::FaceMe => "All that you see",
         }
     }
 
@@ -79,6 +125,30 @@ impl Card {
                 key(Command::Palette),
                 key(Command::Shortcuts)
             ),
+            Self::Suspects => format!(
+                "{} goes to the next patch that probably points to the wrong side. Enter flips it, {} leaves it as it is.",
+                key(Command::NextSuspect),
+                key(Command::AcceptSuspect)
+            ),
+            Self::Tools => format!(
+                "{} paints over points, {} draws around them, {} spans a rectangle. {} flips what is selected.",
+                key(Command::BrushTool),
+                key(Command::LassoTool),
+                key(Command::RectangleTool),
+                key(Command::Flip)
+            ),
+            Self::Journal => "Your edits are kept as you make them. After a crash they are offered when you open the \
+                              scan again."
+                .to_owned(),
+            Self::History => format!(
+                "{} takes an edit back, {} makes it again. The tab History lists them all: click one to go there.",
+                key(Command::Undo),
+                key(Command::Redo)
+            ),
+            Self::FaceMe => format!(
+                "{} turns what you see so that it faces you. Look at the scan from where it should face to.",
+                key(Command::WhatISeeFacesMe)
+            ),
         }
     }
 
@@ -86,9 +156,14 @@ impl Card {
         match self {
             Self::Look => progress.is_oriented,
             // Who has mended knows.
-            Self::Point => progress.is_oriented && !progress.is_mended,
-            Self::Size => progress.is_mended && progress.has_patches,
-            Self::Find => progress.is_mended,
+            Self::Point => progress.is_oriented && progress.n_steps == 0,
+            Self::Size => progress.n_steps > 0 && progress.has_patches,
+            Self::Find => progress.n_steps > 0,
+            Self::Suspects => progress.is_oriented && progress.lists_suspects,
+            Self::Tools => progress.is_oriented && (progress.is_selecting || progress.n_steps >= N_BEFORE_TOOLS),
+            Self::Journal => progress.is_journaled && progress.n_steps >= N_BEFORE_JOURNAL,
+            Self::History => progress.n_steps >= N_BEFORE_HISTORY,
+            Self::FaceMe => progress.is_oriented && progress.n_steps >= N_BEFORE_FACE_ME,
         }
     }
 }
@@ -100,16 +175,22 @@ pub fn due(dismissed: &BTreeSet<String>, progress: Progress) -> Option<Card> {
         .find(|card| !dismissed.contains(card.name()) && card.is_due(progress))
 }
 
-/// Shows a hint in the lower right corner of `view`, where nothing else is; says whether the user dismisses it.
+/// Shows a hint in the lower right corner of `view`, where nothing else is: left of it are the axes, above is the middle.
+/// Says whether the user dismisses it. In a view that has no room it is not shown.
 pub fn ui(ui: &Ui, view: Rect, card: Card) -> bool {
     let mut dismissed = false;
+    let beside = GIZMO_WIDTH + 2.0 * SPACE_M + 2.0 * SPACE_L;
+    let width = WIDTH.min(view.width() - beside);
+    if width < MIN_WIDTH {
+        return false;
+    }
     Area::new(Id::unique("hint"))
         .order(Order::Middle)
         .pivot(Align2::RIGHT_BOTTOM)
         .fixed_pos(view.right_bottom() - Vec2::splat(SPACE_M))
         .show(ui.ctx(), |ui| {
             theme::card(ui).show(ui, |ui| {
-                ui.set_width(WIDTH);
+                ui.set_width(width);
                 ui.spacing_mut().item_spacing.y = SPACE_S;
                 ui.label(RichText::new(card.title()).color(theme::accent(ui)).strong());
                 ui.add(Label::new(card.text(ui.ctx())).wrap());
@@ -135,11 +216,33 @@ mod tests {
         assert_eq!(due(&dismissed, progress), Some(Card::Look));
         dismissed.insert("look".to_owned());
         assert_eq!(due(&dismissed, progress), Some(Card::Point));
-        progress.is_mended = true;
+        progress.n_steps = 1;
         assert_eq!(due(&dismissed, progress), Some(Card::Find), "there are no patches");
         progress.has_patches = true;
         assert_eq!(due(&dismissed, progress), Some(Card::Size));
         dismissed.extend(["size", "find"].map(str::to_owned));
+        assert_eq!(due(&dismissed, progress), None);
+        // What has just been opened comes first.
+        progress.lists_suspects = true;
+        assert_eq!(due(&dismissed, progress), Some(Card::Suspects));
+        progress.lists_suspects = false;
+        progress.is_selecting = true;
+        assert_eq!(due(&dismissed, progress), Some(Card::Tools));
+        dismissed.insert("tools".to_owned());
+        // The rest comes with the edits, one at a time.
+        progress.n_steps = 2;
+        assert_eq!(due(&dismissed, progress), None, "there is no journal");
+        progress.is_journaled = true;
+        assert_eq!(due(&dismissed, progress), Some(Card::Journal));
+        dismissed.insert("journal".to_owned());
+        assert_eq!(due(&dismissed, progress), None);
+        progress.n_steps = 3;
+        assert_eq!(due(&dismissed, progress), Some(Card::History));
+        dismissed.insert("history".to_owned());
+        progress.n_steps = 6;
+        assert_eq!(due(&dismissed, progress), Some(Card::FaceMe));
+        dismissed.extend(Card::ALL.map(|card| card.name().to_owned()));
+        progress.lists_suspects = true;
         assert_eq!(due(&dismissed, progress), None);
     }
 }

@@ -10,6 +10,8 @@ const REACH: f32 = 32.0;
 const BALL: f32 = 9.0;
 /// From the view's corner to the middle, in points.
 pub(super) const MARGIN: f32 = 54.0;
+/// What the axes take of the view's width, from its left edge, in points.
+pub const WIDTH: f32 = 2.0 * MARGIN;
 
 struct Axis {
     name: &'static str,

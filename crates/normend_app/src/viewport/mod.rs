@@ -20,6 +20,7 @@ use crate::pace::Pace;
 use crate::scene_sync::Scene;
 use clip_handles::FaceDrag;
 pub use drawing::{DrawEvent, ViewPlace};
+pub use gizmo::WIDTH as GIZMO_WIDTH;
 use flight::Flight;
 use fly::Fly;
 use hold::Hold;
