@@ -173,6 +173,10 @@ impl Recipe {
             state.change(&steps[n_joined].change);
             n_joined += 1;
         }
+        if n_joined == 1 {
+            // One step is one step.
+            (n_joined, state) = (0, self.first_state());
+        }
         let joined = RecordedStep {
             kind: EditKind::Recipe,
             change: StateChange::between(&self.first_state(), &state),
