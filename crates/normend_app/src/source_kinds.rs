@@ -141,8 +141,8 @@ impl Default for SourceKinds {
     fn default() -> Self {
         Self {
             counts: [0; SourceKind::ALL.len()],
-            // All points of a file with normals have one, which is nothing to look at unasked.
-            shown: SourceKind::ALL.map(|kind| kind != SourceKind::File),
+            // All points of a file with normals have one, which is nothing to look at unasked; and flipped points show their side.
+            shown: SourceKind::ALL.map(|kind| !matches!(kind, SourceKind::File | SourceKind::Flipped)),
             of: None,
         }
     }
