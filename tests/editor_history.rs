@@ -22,6 +22,8 @@ fn a_click_in_the_history_goes_there_and_back() {
     editor.mend();
     let mended = editor.bits();
     editor.key(Modifiers::SHIFT, Key::Enter);
+    // What is under the pointer is known after a frame or more.
+    editor.wait("a turned region", |app| app.document().unwrap().n_done() == 2);
     let turned = editor.bits();
     assert!(first != mended && mended != turned);
     assert_eq!(editor.app().document().unwrap().n_done(), 2);
