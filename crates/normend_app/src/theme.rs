@@ -154,6 +154,26 @@ pub fn fit_side_panel(ui: &mut Ui, panel_width: f32) {
     let content_width = panel_width - 2.0 * SPACE_M - SCROLL_WIDTH;
     ui.set_max_width(content_width);
     set_value_width(ui.spacing_mut(), content_width - LABEL_WIDTH - SPACE_S);
+    if panel_width < SIDE_PANEL_WIDTH {
+        // So that rows of buttons still fit.
+        ui.spacing_mut().button_padding.x = 0.5 * SPACE_M;
+    }
+}
+
+/// Widths of buttons that together fill `width`, with `gap` between them and the same room around each text, in points.
+/// For buttons without padding of their own.
+pub fn filling<const N: usize>(ui: &Ui, texts: [&str; N], width: f32, gap: f32) -> [f32; N] {
+    let font = TextStyle::Button.resolve(ui.style());
+    let text_width = |text: &str| {
+        let laid_out = ui
+            .painter()
+            .layout_no_wrap(text.to_owned(), font.clone(), Color32::WHITE);
+        laid_out.size().x
+    };
+    let widths = texts.map(text_width);
+    let n_gaps = N.saturating_sub(1) as f32;
+    let room = (width - widths.iter().sum::<f32>() - n_gaps * gap) / N.max(1) as f32;
+    widths.map(|width| width + room.max(0.0))
 }
 
 /// Width of the second column of [`rows`], where inputs end at the same right edge, in points.

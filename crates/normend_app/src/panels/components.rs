@@ -3,7 +3,7 @@
 use egui::{Button, ComboBox, RichText, ScrollArea, Ui, Vec2};
 use normend_core::{Propagation, SideRule};
 
-use crate::command::Action;
+use crate::command::{Action, Command};
 use crate::components::{ComponentAction, Standing};
 use crate::session::Session;
 use crate::theme::{self, SPACE_XS};
@@ -62,7 +62,7 @@ pub fn ui(ui: &mut Ui, session: &Session, blocked: Option<&str>) -> Option<Actio
 fn buttons(ui: &mut Ui, session: &Session) -> Option<ComponentAction> {
     let focus = session.components.focus();
     let mut chosen = None;
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = SPACE_XS;
         let button = |ui: &mut Ui, text: &str, tooltip: &str| {
             let response = ui.add_enabled(focus.is_some(), Button::new(text));
@@ -84,7 +84,7 @@ fn buttons(ui: &mut Ui, session: &Session) -> Option<ComponentAction> {
             }
         } else if ui
             .button("Show hidden")
-            .on_hover_text("Show all points again")
+            .on_hover_text(Command::ShowAll.tooltip_with_keys(ui.ctx()))
             .clicked()
         {
             chosen = Some(ComponentAction::ShowHidden);

@@ -41,16 +41,18 @@ pub fn ui(ui: &mut Ui, recent: &[PathBuf], can_drop: bool) -> Option<Action> {
             ui.horizontal(|ui| {
                 let size = Vec2::new(0.0, 36.0);
                 let open = theme::primary_button(ui, "Open a scan…").min_size(size);
-                let keys = Command::Open.keys_text(ui.ctx());
-                if ui.add(open).on_hover_text(format!("{} ({keys})", Command::Open.tooltip())).clicked() {
+                let tooltip = |command: Command| command.tooltip_with_keys(ui.ctx());
+                let tooltips = [Command::Open, Command::OpenSample, Command::OpenPath].map(tooltip);
+                let [of_open, of_sample, of_path] = tooltips;
+                if ui.add(open).on_hover_text(of_open).clicked() {
                     action = Some(Command::Open.into());
                 }
                 let sample = Button::new("Try the sample").min_size(size);
-                if ui.add(sample).on_hover_text(Command::OpenSample.tooltip()).clicked() {
+                if ui.add(sample).on_hover_text(of_sample).clicked() {
                     action = Some(Command::OpenSample.into());
                 }
                 let path = Button::new("Type a path…").min_size(size);
-                if ui.add(path).on_hover_text(Command::OpenPath.tooltip()).clicked() {
+                if ui.add(path).on_hover_text(of_path).clicked() {
                     action = Some(Command::OpenPath.into());
                 }
             });

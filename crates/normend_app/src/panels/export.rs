@@ -205,6 +205,7 @@ impl ExportWindow {
             let enter = modal::enter_pressed(ui);
             let refusal = self.refusal();
             let export = ui.add_enabled(refusal.is_none(), theme::primary_button(ui, self.words.button));
+            let export = export.on_hover_text("Write the file (Enter)");
             let export = export.on_disabled_hover_text(refusal.unwrap_or_default());
             if export.clicked() || enter {
                 match (refusal, typed_path(&self.path)) {
@@ -220,7 +221,7 @@ impl ExportWindow {
                     }
                 }
             }
-            if ui.button("Cancel").clicked() {
+            if modal::cancel_button(ui) {
                 decision = Decision::Close;
             }
         });

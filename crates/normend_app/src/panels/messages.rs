@@ -129,11 +129,13 @@ fn filters(ui: &mut Ui, view: &mut LogView, messages: &mut Messages) {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let any = !messages.entries().is_empty();
             let clear = ui.add_enabled(any, Button::new("Clear"));
-            if clear.on_hover_text("Forget all messages").clicked() {
+            let clear = clear.on_hover_text("Forget all messages");
+            if clear.on_disabled_hover_text("There are no messages").clicked() {
                 messages.clear();
             }
             let copy = ui.add_enabled(any, Button::new("Copy"));
-            if copy.on_hover_text("Copy the listed messages as text").clicked() {
+            let copy = copy.on_hover_text("Copy the listed messages as text");
+            if copy.on_disabled_hover_text("There are no messages").clicked() {
                 let listed = messages.entries().iter().filter(|entry| view.lists(entry));
                 ui.ctx().copy_text(as_text(listed));
             }

@@ -33,6 +33,14 @@ pub(crate) enum Modal {
     Unsaved(Leaving),
 }
 
+/// The button that closes such a window and changes nothing; says whether it was clicked.
+pub(crate) fn cancel_button(ui: &mut Ui) -> bool {
+    let button = ui.button("Cancel");
+    button
+        .on_hover_text("Close this window, change nothing (Escape)")
+        .clicked()
+}
+
 /// Shows a window called `title` over a backdrop that takes every click beside it. Tab stays inside.
 pub(crate) fn show<R>(ui: &Ui, title: &str, width: f32, content: impl FnOnce(&mut Ui) -> R) -> R {
     let room = ui.ctx().content_rect().width() - 4.0 * SPACE_L;

@@ -82,13 +82,14 @@ impl OpenPathWindow {
         ui.add_space(SPACE_S);
         ui.horizontal(|ui| {
             let open = ui.add_enabled(path.is_some(), theme::primary_button(ui, "Open"));
+            let open = open.on_hover_text("Open this file (Enter)");
             let open = open.on_disabled_hover_text("Type a path first");
             if (open.clicked() || enter)
                 && let Some(path) = path
             {
                 decision = Decision::Open(path);
             }
-            if ui.button("Cancel").clicked() {
+            if modal::cancel_button(ui) {
                 decision = Decision::Close;
             }
         });

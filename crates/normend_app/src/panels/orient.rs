@@ -9,8 +9,6 @@ use crate::session::Session;
 use crate::theme::{self, SPACE_XS};
 
 const K_NORMALS: std::ops::RangeInclusive<usize> = 3..=64;
-/// Width of the button to keep given normals, in points; the other one takes the rest of the column.
-const KEEP_WIDTH: f32 = 94.0;
 const K_GRAPH: std::ops::RangeInclusive<usize> = 1..=32;
 
 /// The tab. `propagating` says that a propagation runs, `blocked` why none can be started.
@@ -99,11 +97,7 @@ fn propagation(ui: &mut Ui, session: &mut Session, propagating: bool, blocked: O
             Button::new("Propagate")
         };
         let response = ui.add_enabled(blocked.is_none(), button);
-        let tooltip = format!(
-            "{} ({})",
-            Command::Propagate.tooltip(),
-            Command::Propagate.keys_text(ui.ctx())
-        );
+        let tooltip = Command::Propagate.tooltip_with_keys(ui.ctx());
         if response
             .on_hover_text(tooltip)
             .on_disabled_hover_text(blocked.unwrap_or_default())
@@ -112,7 +106,8 @@ fn propagation(ui: &mut Ui, session: &mut Session, propagating: bool, blocked: O
             action = Some(Action::Propagate(*draft));
         }
         let revert = ui.add_enabled(changed, Button::new("Revert"));
-        if revert.on_hover_text("Back to the parameters in force").clicked() {
+        let revert = revert.on_hover_text("Back to the parameters in force");
+        if revert.on_disabled_hover_text("Nothing is changed").clicked() {
             *draft = session.requested;
         }
     });
@@ -126,11 +121,11 @@ fn start_row(ui: &mut Ui, draft: &mut Parameters, has_normals: bool) {
     ui.label(RichText::new("Start").weak())
         .on_hover_text("Where the first normals come from");
     ui.horizontal(|ui| {
+        let widths = theme::filling(ui, Start::ALL.map(Start::label), theme::value_width(ui), SPACE_XS);
         ui.spacing_mut().item_spacing.x = SPACE_XS;
-        for each in Start::ALL {
+        ui.spacing_mut().button_padding.x = 0.0;
+        for (each, width) in Start::ALL.into_iter().zip(widths) {
             let possible = each != Start::Keep || has_normals;
-            let rest = theme::value_width(ui) - SPACE_XS - KEEP_WIDTH;
-            let width = if each == Start::Keep { KEEP_WIDTH } else { rest };
             let button = Button::selectable(draft.start == each, each.label()).min_size(Vec2::new(width, 0.0));
             let response = ui.add_enabled(possible, button);
             let tooltip = match each {

@@ -173,10 +173,12 @@ pub fn other_scan_ui(ui: &Ui, name: &str, of: &ScanIdentity, here: &str) -> Opti
         ui.add_space(SPACE_S);
         let mut decision = None;
         ui.horizontal(|ui| {
-            if ui.add(theme::primary_button(ui, "Apply")).clicked() || modal::enter_pressed(ui) {
+            let apply = ui.add(theme::primary_button(ui, "Apply"));
+            let apply = apply.on_hover_text("Do the edits of the recipe with this scan (Enter)");
+            if apply.clicked() || modal::enter_pressed(ui) {
                 decision = Some(true);
             }
-            if ui.button("Cancel").clicked() {
+            if modal::cancel_button(ui) {
                 decision = Some(false);
             }
         });

@@ -188,7 +188,11 @@ impl PictureWindow {
         ui.horizontal(|ui| {
             let enter = modal::enter_pressed(ui);
             let pixels = self.pixels();
+            let no_size = "Give a width and a height first";
             let save = ui.add_enabled(pixels.is_some(), theme::primary_button(ui, "Save"));
+            let save = save
+                .on_hover_text("Write the file (Enter)")
+                .on_disabled_hover_text(no_size);
             if (save.clicked() || enter)
                 && let Some(size) = pixels
                 && let Some(target) = self.target()
@@ -197,13 +201,14 @@ impl PictureWindow {
             }
             if !self.is_turntable {
                 let copy = ui.add_enabled(pixels.is_some(), egui::Button::new("Copy"));
-                if copy.on_hover_text("Put the picture into the clipboard").clicked()
+                let copy = copy.on_hover_text("Put the picture into the clipboard");
+                if copy.on_disabled_hover_text(no_size).clicked()
                     && let Some(size) = pixels
                 {
                     decision = Decision::Draw(self.order(size, PictureTarget::Clipboard));
                 }
             }
-            if ui.button("Cancel").clicked() {
+            if modal::cancel_button(ui) {
                 decision = Decision::Close;
             }
         });

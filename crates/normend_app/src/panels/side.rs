@@ -1,6 +1,6 @@
 //! The side panel: a row of tabs, one of them open, and an edge that is dragged.
 
-use egui::{Button, CursorIcon, EventFilter, Id, Key, Modifiers, Rect, Sense, TextStyle, Ui, Vec2, WidgetInfo};
+use egui::{Button, CursorIcon, EventFilter, Id, Key, Modifiers, Rect, Sense, Ui, Vec2, WidgetInfo};
 
 use crate::theme::{self, SPACE_M, SPACE_XS};
 
@@ -101,24 +101,14 @@ pub fn edge(ui: &Ui, shown: f32, wanted: &mut f32) {
 /// The row of tabs; a click opens one. Together they are as wide as the panel's content, with the same room around each
 /// name.
 pub fn tabs(ui: &mut Ui, open: &mut SideTab) {
-    let width = theme::content_width(ui);
-    let font = TextStyle::Button.resolve(ui.style());
-    let color = ui.visuals().text_color();
-    let name_width = |label: &str| {
-        let laid_out = ui.painter().layout_no_wrap(label.to_owned(), font.clone(), color);
-        laid_out.size().x
-    };
-    let names = SideTab::ALL.map(|tab| name_width(tab.label()));
-    let n_tabs = names.len() as f32;
     let gap = 0.5 * SPACE_XS;
-    let room = (width - names.iter().sum::<f32>() - (n_tabs - 1.0) * gap) / n_tabs;
+    let widths = theme::filling(ui, SideTab::ALL.map(SideTab::label), theme::content_width(ui), gap);
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = gap;
-        // The least width of each says how much room there is around its name.
+        // Their widths have it.
         ui.spacing_mut().button_padding.x = 0.0;
-        for (tab, name) in SideTab::ALL.into_iter().zip(names) {
-            let size = Vec2::new(name + room.max(0.0), 26.0);
-            let button = Button::selectable(*open == tab, tab.label()).min_size(size);
+        for (tab, width) in SideTab::ALL.into_iter().zip(widths) {
+            let button = Button::selectable(*open == tab, tab.label()).min_size(Vec2::new(width, 26.0));
             if ui.add(button).on_hover_text(tab.tooltip()).clicked() {
                 *open = tab;
             }

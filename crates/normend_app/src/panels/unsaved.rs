@@ -40,7 +40,8 @@ pub fn ui(ui: &Ui, name: &str, mends: bool, is_journaled: bool) -> Decision {
         ui.add_space(SPACE_S);
         ui.horizontal(|ui| {
             let enter = modal::enter_pressed(ui);
-            if ui.add(theme::primary_button(ui, "Export…")).clicked() || enter {
+            let export = ui.add(theme::primary_button(ui, "Export…"));
+            if export.on_hover_text("Write the oriented scan first (Enter)").clicked() || enter {
                 decision = Decision::Export;
             }
             let keep = ui.add_enabled(is_journaled, egui::Button::new("Keep for next time"));
@@ -49,10 +50,14 @@ pub fn ui(ui: &Ui, name: &str, mends: bool, is_journaled: bool) -> Decision {
             if keep.clicked() {
                 decision = Decision::Keep;
             }
-            if ui.button("Discard").clicked() {
+            if ui
+                .button("Discard")
+                .on_hover_text("Go on and forget the edits")
+                .clicked()
+            {
                 decision = Decision::Discard;
             }
-            if ui.button("Cancel").clicked() {
+            if modal::cancel_button(ui) {
                 decision = Decision::Cancel;
             }
         });

@@ -36,9 +36,9 @@ fn list(ui: &mut Ui, session: &mut Session) -> Option<Action> {
         format!("{} of your own", places.len())
     };
     ui.label(RichText::new(text).weak());
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = SPACE_XS;
-        // All four stand in one row.
+        // All four stand in one row of a panel of the usual width.
         ui.spacing_mut().button_padding.x = SPACE_S;
         let add = ui.add_enabled(places.len() < MOST, Button::new("Add here"));
         let add = add.on_hover_text("Let the place that you look from vote too");
