@@ -9,10 +9,12 @@ mod driver;
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
-use normend_app::SettingsStore;
 use normend_app::command::Command;
 use normend_app::panels::hints::Card;
+use normend_app::panels::side::SideTab;
 use normend_app::settings::{Settings, ThemeChoice};
+use normend_app::{SettingsStore, theme};
+use normend_core::Preset;
 
 use driver::{Editor, sphere_with_wrong_cap, start, start_prepared};
 
@@ -224,6 +226,199 @@ fn every_window_has_names_for_its_widgets_in_both_themes() {
             editor.key(Modifiers::NONE, Key::Escape);
         }
     }
+}
+
+/// Everything that can be shown about a scan: sources, a pin, a selection, suspects, steps to undo and to redo.
+fn fill(editor: &mut Editor) {
+    editor.mend();
+    editor.key(Modifiers::NONE, Key::N);
+    editor.wait("the suspects", |app| app.suspects().unwrap().is_known());
+    editor.harness.state_mut().act(Command::SelectAll.into());
+    editor.wait("a selection", |app| !app.is_selecting());
+    editor.key(Modifiers::NONE, Key::P);
+    editor.harness.state_mut().act(Command::SelectNone.into());
+    editor.key(Modifiers::COMMAND, Key::Z);
+    let document = editor.app().document().unwrap();
+    assert!(!document.selected().is_empty() && document.next_redo().is_some() && document.n_done() > 1);
+}
+
+#[test]
+fn every_tab_and_window_has_names_at_any_width_of_the_panel() {
+    let widths = [
+        *theme::SIDE_PANEL_WIDTHS.start(),
+        theme::SIDE_PANEL_WIDTH,
+        *theme::SIDE_PANEL_WIDTHS.end(),
+    ];
+    for width in widths {
+        let prepare = |settings: &mut Settings| settings.side_width = width;
+        let Some(mut editor) = start_prepared(1.0, prepare, sphere_with_wrong_cap) else {
+            return;
+        };
+        editor.harness.set_size(egui::Vec2::new(1200.0, 1100.0));
+        editor.wait_until_oriented();
+        fill(&mut editor);
+        for tab in SideTab::ALL {
+            editor.open_tab(tab);
+            check(&mut editor, &format!("{}-{width}", tab.label().to_lowercase()));
+            stays_inside(&editor, width);
+        }
+        // With all rows that the methods have.
+        editor.open_tab(SideTab::Orient);
+        editor.click_button("Estimate");
+        for preset in Preset::ALL {
+            editor.choose("Preset", preset.label());
+            check(&mut editor, &format!("orient-{}-{width}", preset.name()));
+            stays_inside(&editor, width);
+        }
+    }
+}
+
+/// Checks that no widget of the side panel reaches past the window's right edge, and that its tabs are in one row and end
+/// where the content does.
+fn stays_inside(editor: &Editor, width: f32) {
+    let right = editor.harness.ctx.content_rect().right();
+    let inside = right - theme::SPACE_M;
+    let left = right - width;
+    let nodes = editor
+        .harness
+        .query_all(egui_kittest::kittest::by().predicate(|_| true));
+    let buttons = [
+        Role::Button,
+        Role::ComboBox,
+        Role::Slider,
+        Role::SpinButton,
+        Role::TextInput,
+    ];
+    for node in nodes.filter(|node| buttons.contains(&node.accesskit_node().role())) {
+        let rect = node.rect();
+        if rect.left() >= left {
+            let label = node.accesskit_node().label();
+            assert!(rect.right() <= inside + 0.5, "{label:?} at {rect:?}, inside {inside}");
+        }
+    }
+    let tabs = SideTab::ALL.map(|tab| {
+        let tabs = editor.harness.query_all_by_role_and_label(Role::Button, tab.label());
+        tabs.last().unwrap().rect()
+    });
+    assert!(tabs.iter().all(|tab| tab.top() == tabs[0].top()), "{tabs:?}");
+    assert!((tabs[0].left() - left - theme::SPACE_M).abs() <= 1.0, "{tabs:?}");
+    let end = inside - theme::SCROLL_WIDTH;
+    assert!((tabs[4].right() - end).abs() <= 1.0, "{tabs:?} end at {end}");
+}
+
+#[test]
+fn every_other_window_has_names() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let scan = editor.folder.path().join("sphere.ply");
+    fill(&mut editor);
+    for command in [
+        Command::Screenshot,
+        Command::Turntable,
+        Command::OpenRecipePath,
+        Command::OpenReferencePath,
+        Command::OpenPath,
+        Command::Export,
+        Command::Palette,
+        Command::About,
+        Command::Preferences,
+        Command::Log,
+        Command::Shortcuts,
+    ] {
+        editor.harness.state_mut().act(command.into());
+        check(&mut editor, command.name());
+        editor.key(Modifiers::NONE, Key::Escape);
+    }
+    editor.harness.state_mut().act(Command::WhatISeeFacesMe.into());
+    editor.wait("a proposal", |app| app.n_proposed().is_some() || !app.is_selecting());
+    check(&mut editor, "proposal");
+    editor.key(Modifiers::NONE, Key::Escape);
+    editor.close();
+    editor.harness.run_steps(3);
+    assert!(editor.shows("Keep for next time"));
+    check(&mut editor, "unsaved");
+    editor.key(Modifiers::NONE, Key::Escape);
+    let mut editor = editor.crash_and_start(&scan);
+    editor.wait_until_oriented();
+    assert!(editor.shows("Decide later"));
+    check(&mut editor, "restore");
+}
+
+#[test]
+fn the_side_panel_is_as_wide_as_it_is_dragged() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let edge = |editor: &Editor| editor.app().view_rect().right();
+    let before = edge(&editor);
+    let place = egui::pos2(before + 3.0, 300.0);
+    for x in [0.0, -20.0, -60.0] {
+        let pointer = place + egui::vec2(x, 0.0);
+        if x == 0.0 {
+            editor.harness.drag_at(pointer);
+        } else {
+            editor.harness.hover_at(pointer);
+        }
+        editor.harness.run_steps(3);
+    }
+    editor.harness.drop_at(place - egui::vec2(60.0, 0.0));
+    editor.harness.run_steps(4);
+    assert_eq!(edge(&editor), before - 60.0);
+    assert_eq!(kept(&editor).side_width, theme::SIDE_PANEL_WIDTH + 60.0);
+    // By keyboard, to the ends and no farther.
+    let slider = |editor: &Editor| {
+        let edge = editor
+            .harness
+            .get_by_role_and_label(Role::Slider, "Width of the side panel");
+        edge.focus();
+    };
+    slider(&editor);
+    editor.harness.run_steps(2);
+    editor.key(Modifiers::NONE, Key::ArrowLeft);
+    assert_eq!(kept(&editor).side_width, theme::SIDE_PANEL_WIDTH + 76.0);
+    for _ in 0..20 {
+        editor.key(Modifiers::NONE, Key::ArrowRight);
+    }
+    assert!(editor.is_focused(Role::Slider, "Width of the side panel"));
+    assert_eq!(kept(&editor).side_width, *theme::SIDE_PANEL_WIDTHS.start());
+    for _ in 0..40 {
+        editor.key(Modifiers::NONE, Key::ArrowLeft);
+    }
+    assert_eq!(kept(&editor).side_width, *theme::SIDE_PANEL_WIDTHS.end());
+}
+
+#[test]
+fn further_hints_come_at_their_moment() {
+    let prepare = |settings: &mut Settings| {
+        settings.dismissed_hints = ["look", "point", "size", "find"].map(str::to_owned).into()
+    };
+    let Some(mut editor) = start_prepared(1.0, prepare, sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    assert!(!editor.shows("Got it"));
+    editor.key(Modifiers::NONE, Key::L);
+    assert!(editor.shows("Choose points by hand"));
+    editor.click_button("Got it");
+    assert!(!editor.shows("Got it"));
+    editor.key(Modifiers::NONE, Key::M);
+    editor.open_tab(SideTab::Suspects);
+    editor.wait("the suspects", |app| app.suspects().unwrap().is_known());
+    editor.harness.run_steps(4);
+    assert!(editor.shows("From suspect to suspect"));
+    editor.click_button("Got it");
+    for _ in 0..2 {
+        editor.harness.state_mut().act(Command::SelectAll.into());
+        editor.harness.run_steps(4);
+        editor.harness.state_mut().act(Command::SelectNone.into());
+        editor.harness.run_steps(4);
+    }
+    assert!(editor.shows("Nothing gets lost"), "edits are journaled");
+    editor.click_button("Got it");
+    assert!(editor.shows("Back and forth"));
 }
 
 /// Checks that every widget has a name. `NORMEND_PICTURES` names a folder that gets a picture to look at.
