@@ -1,5 +1,7 @@
 //! The list of what was done, through the real app: jumping in it, and parameters that undo takes back.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests fail as tests do, by panicking")]
+
 #[expect(dead_code, reason = "the other tests of the editor use the rest")]
 #[path = "editor/driver.rs"]
 mod driver;

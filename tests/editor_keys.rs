@@ -228,4 +228,7 @@ fn tab_reaches_every_button_in_the_order_they_are_read() {
     }
     let place = |name: &str| reached.iter().position(|(_, label)| label == name).unwrap();
     assert!(place("File") < place("Help") && place("Help") < place("Open…") && place("Open…") < place("Export…"));
+    // The view comes before the panel beside it, as one reads; then the edge of the panel and its tabs.
+    let order = ["Export…", "3D view", "Width of the side panel", "Orient", "History"].map(place);
+    assert!(order.is_sorted(), "{order:?}: {reached:?}");
 }
