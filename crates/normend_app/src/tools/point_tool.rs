@@ -395,7 +395,7 @@ mod tests {
                 patch: None,
                 level: Some((3, 7)),
             },
-            change: Change::from_flips(&[0..n_points as u32]),
+            change: Change::from_flips(std::slice::from_ref(&(0..n_points as u32))),
             n_pinned,
             n_hindering,
         });
