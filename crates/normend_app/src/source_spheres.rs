@@ -9,6 +9,8 @@ use crate::theme;
 
 /// Most spheres of kinds that come by the thousand: enough to see where they are, too few to hide the scan or slow it down.
 const MOST: usize = 500;
+/// Most spheres of pins, which lie close together: a sphere is as large as many points, and what is pinned is to be seen.
+const MOST_OF_MARKS: u64 = 60;
 
 /// Spheres with their points: first the user's own sources, which can be selected, then the others.
 #[derive(Default)]
@@ -96,9 +98,9 @@ impl SourceSpheres {
     }
 }
 
-/// Some of the points, evenly picked: O([`MOST`]), however many there are.
+/// Some of the points, evenly picked: O([`MOST_OF_MARKS`]), however many there are.
 fn some_of(points: &PointSet) -> impl Iterator<Item = u32> {
-    let step = points.len().div_ceil(MOST as u64).max(1);
+    let step = points.len().div_ceil(MOST_OF_MARKS).max(1);
     let ranks = (0..points.len()).step_by(step as usize);
     ranks.filter_map(|rank| points.select(rank as u32))
 }
@@ -111,9 +113,9 @@ mod tests {
     fn some_are_evenly_picked_and_few_are_all() {
         let few: PointSet = [3, 9, 70_000].into_iter().collect();
         assert_eq!(some_of(&few).collect::<Vec<_>>(), [3, 9, 70_000]);
-        let many: PointSet = (0..1_000_000).map(|point| 2 * point).collect();
+        let many: PointSet = (0..1_200_000).map(|point| 2 * point).collect();
         let some: Vec<u32> = some_of(&many).collect();
-        assert_eq!(some.len(), MOST);
-        assert_eq!((some[0], some[1]), (0, 4000));
+        assert_eq!(some.len() as u64, MOST_OF_MARKS);
+        assert_eq!((some[0], some[1]), (0, 40_000));
     }
 }
