@@ -864,7 +864,9 @@ fn render_turns_a_scan_once_around() {
     }
     rendered.expect(0);
     let n_orange = |frame: usize| {
-        let picture = image::open(folder.path().join(format!("film_{frame:03}.png"))).unwrap().to_rgb8();
+        let picture = image::open(folder.path().join(format!("film_{frame:03}.png")))
+            .unwrap()
+            .to_rgb8();
         let is_orange = |p: &&image::Rgb<u8>| i32::from(p[0]) > i32::from(p[2]) + 40;
         picture.pixels().filter(is_orange).count()
     };
@@ -873,7 +875,11 @@ fn render_turns_a_scan_once_around() {
     assert!(counts[1] > counts[2] / 4 && counts[1] < counts[2] * 3 / 4, "{counts:?}");
     assert!(!folder.path().join("film.png").exists() && !folder.path().join("film_004.png").exists());
     let again = run(&folder, line);
-    assert!(again.code == Some(1) && again.err.contains("film_000.png exists already"), "{}", again.err);
+    assert!(
+        again.code == Some(1) && again.err.contains("film_000.png exists already"),
+        "{}",
+        again.err
+    );
     run(&folder, "render half.ply -o film.png --turntable 1").expect(2);
 }
 

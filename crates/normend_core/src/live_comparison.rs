@@ -72,7 +72,11 @@ impl LiveComparison {
             *tally = [tally[0] + u32::from(sides[0]), tally[1] + u32::from(sides[1])];
             live.n_wrong += u64::from(sides[0]);
         }
-        live.n_wrong_component_flip = live.tallies.iter().map(|&[shown, flipped]| u64::from(shown.min(flipped))).sum();
+        live.n_wrong_component_flip = live
+            .tallies
+            .iter()
+            .map(|&[shown, flipped]| u64::from(shown.min(flipped)))
+            .sum();
         progress.report(1.0)?;
         Ok(live)
     }
@@ -102,7 +106,10 @@ impl LiveComparison {
         let mut toggled: Vec<Range<u32>> = Vec::new();
         for position in change.ranges().iter().flat_map(Clone::clone) {
             let index = position as usize;
-            let (stored, turned) = (self.wrong_as_stored.contains(index), self.wrong_when_turned.contains(index));
+            let (stored, turned) = (
+                self.wrong_as_stored.contains(index),
+                self.wrong_when_turned.contains(index),
+            );
             // Neither at right angles or unjudged, both without a normal.
             if stored == turned {
                 continue;

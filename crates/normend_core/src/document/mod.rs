@@ -339,12 +339,7 @@ impl Document {
     ///
     /// # Errors
     /// [`EditError`] when the change does not fit the cloud; the document is unchanged then.
-    pub fn apply_recorded(
-        &mut self,
-        kind: EditKind,
-        change: StateChange,
-        n_turned: u64,
-    ) -> Result<Change, EditError> {
+    pub fn apply_recorded(&mut self, kind: EditKind, change: StateChange, n_turned: u64) -> Result<Change, EditError> {
         if let Some(point) = change.largest_point() {
             self.check_point(point)?;
         }
@@ -482,7 +477,14 @@ impl Document {
     /// The state before the first of the [`Self::steps`]: as opened, unless older steps are forgotten. O(state and history).
     pub fn state_before_steps(&self) -> State {
         let mut state = self.state.clone();
-        for step in self.history.steps().take(self.n_done()).collect::<Vec<_>>().into_iter().rev() {
+        for step in self
+            .history
+            .steps()
+            .take(self.n_done())
+            .collect::<Vec<_>>()
+            .into_iter()
+            .rev()
+        {
             state.change(&step.backward);
         }
         state

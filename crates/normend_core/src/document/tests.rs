@@ -383,7 +383,9 @@ fn check_session(worlds: &[Setting; 2], acts: Vec<Act>) -> Result<(), TestCaseEr
 fn check_recorded(document: &Document, world: &Setting) -> Result<(), TestCaseError> {
     let mut again = document_of(world.0.n_points);
     for step in document.steps().take(document.n_done()) {
-        again.apply_recorded(step.kind(), step.change().clone(), step.n_turned()).unwrap();
+        again
+            .apply_recorded(step.kind(), step.change().clone(), step.n_turned())
+            .unwrap();
     }
     again.install(Propagation {
         parameters: again.parameters(),

@@ -231,7 +231,9 @@ impl Regions {
     /// The tops of regions with a source, ascending, each with the source's point.
     pub fn source_tops(&self) -> impl Iterator<Item = (u32, u32)> {
         let point = |&position: &u32| self.tree.order()[position as usize];
-        self.source_by_top.iter().map(move |(&top, source)| (top, point(source)))
+        self.source_by_top
+            .iter()
+            .map(move |(&top, source)| (top, point(source)))
     }
 
     /// The positions below `top`, itself included, without those below another top in between. A top that is no base region's does not
