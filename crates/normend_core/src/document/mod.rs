@@ -37,6 +37,8 @@ mod state_tests;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
+mod thousand_tests;
+#[cfg(test)]
 mod voted_tests;
 
 pub use components::ComponentSide;
