@@ -16,7 +16,7 @@ use normend_app::coloring::Coloring;
 use normend_app::command::{Action, Command};
 use normend_app::panels::side::SideTab;
 use normend_app::settings::ThemeChoice;
-use normend_core::{Parameters, Start};
+use normend_core::{Parameters, Preset, Start, shapes};
 
 /// Fewer colors are an empty picture: text alone has more shades of gray.
 const LEAST_COLORS: usize = 60;
@@ -164,7 +164,12 @@ fn gallery(choice: ThemeChoice, theme: &'static str) {
         (Command::Palette, "palette"),
         (Command::Preferences, "preferences"),
         (Command::Screenshot, "picture"),
+        (Command::Turntable, "turntable"),
+        (Command::OpenPath, "open_path"),
+        (Command::SaveRecipe, "save_recipe"),
         (Command::Export, "export"),
+        // Leaving asks, as there are edits.
+        (Command::OpenSample, "unsaved"),
         (Command::About, "about"),
     ] {
         gallery.run(command);
@@ -174,12 +179,81 @@ fn gallery(choice: ThemeChoice, theme: &'static str) {
     }
 }
 
+/// A scan with colors and another value, the ways of coloring that show them, votes, and the question after a crash.
+fn gallery_of_a_file(choice: ThemeChoice, theme: &'static str) {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = folder.path().join("painted.ply");
+    std::fs::write(&scan, painted_scan()).unwrap();
+    let Some(mut gallery) = Gallery::new(choice, theme) else {
+        return;
+    };
+    gallery.editor.harness.state_mut().act(Action::OpenScan(scan.clone()));
+    gallery.editor.wait_until_oriented();
+    gallery.editor.open_tab(SideTab::View);
+    for coloring in [Coloring::File, Coloring::Scalar] {
+        gallery.color(coloring);
+        gallery.shoot(&format!(
+            "coloring_{}",
+            coloring.label().to_lowercase().replace(' ', "_")
+        ));
+    }
+    gallery.color(Coloring::Facing);
+    let voted = Preset::Paper.parameters();
+    gallery.editor.harness.state_mut().act(Action::Propagate(voted));
+    gallery.editor.wait("votes", |app| {
+        let propagation = app.document().unwrap().propagation();
+        propagation.is_some_and(|propagation| !propagation.voted_sources.is_empty())
+    });
+    gallery.editor.open_tab(SideTab::Sources);
+    gallery.shoot("votes");
+    gallery.run(Command::SelectAll);
+    gallery.run(Command::Flip);
+
+    gallery.editor = gallery.editor.crash_and_start(&scan);
+    gallery.editor.harness.set_size(Vec2::new(1360.0, 860.0));
+    gallery.editor.wait("the scan", |app| app.document().is_some());
+    gallery.shoot("window_restore");
+}
+
+/// A part with colors by height and a column of intensities.
+fn painted_scan() -> String {
+    let part = shapes::mechanical_part(30_000);
+    let mut text = format!("ply\nformat ascii 1.0\nelement vertex {}\n", part.positions.len());
+    for name in [
+        "float x",
+        "float y",
+        "float z",
+        "uchar red",
+        "uchar green",
+        "uchar blue",
+        "float intensity",
+    ] {
+        text += &format!("property {name}\n");
+    }
+    text += "end_header\n";
+    for place in &part.positions {
+        let stripe = (8.0 * place.z).sin();
+        let shade = |share: f32| (255.0 * share.clamp(0.0, 1.0)) as u8;
+        let [red, green, blue] = [0.5 + 0.4 * stripe, 0.55, 0.6 - 0.4 * stripe].map(shade);
+        text += &format!(
+            "{} {} {} {red} {green} {blue} {}\n",
+            place.x,
+            place.y,
+            place.z,
+            place.x * place.y + stripe
+        );
+    }
+    text
+}
+
 #[test]
 fn every_part_is_shown_in_the_dark_theme() {
     gallery(ThemeChoice::Dark, "dark");
+    gallery_of_a_file(ThemeChoice::Dark, "dark");
 }
 
 #[test]
 fn every_part_is_shown_in_the_light_theme() {
     gallery(ThemeChoice::Light, "light");
+    gallery_of_a_file(ThemeChoice::Light, "light");
 }
