@@ -589,6 +589,8 @@ impl eframe::App for App {
         actions.extend(self.bars(ui));
         // The view is drawn before the panel beside it: Tab goes from the toolbar to the view, then to the panel.
         let area = ui.available_rect_before_wrap();
+        // Widgets round their sizes; where the view and the panel leave a pixel between them, this is behind it.
+        ui.painter().rect_filled(area, 0.0, ui.visuals().panel_fill);
         let mut view = area;
         if self.session.is_some() {
             view.max.x -= side::shown_width(self.settings.settings.side_width, area.width());
