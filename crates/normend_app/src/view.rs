@@ -1,7 +1,7 @@
 //! The 3D view in a frame: what the pointer does becomes clicks, strokes and menus, and those become edits.
 
 use egui::{CursorIcon, Ui};
-use normend_core::{Document, Edit};
+use normend_core::Document;
 use normend_render::DrawSettings;
 
 use crate::app::App;
@@ -41,6 +41,10 @@ impl App {
         };
         let document = &session.document;
         let means = Means::of(self.tool, pointer.modifiers);
+        if pointer.clicked.is_some() {
+            // Until this click has done something, there is nothing of it to take back.
+            self.clicked_revision = None;
+        }
         let asked = match (pointer.clicked.zip(means), pointer.pivot) {
             (_, Some(pixel)) => self.point_tool.pivot(scene, document, pixel),
             (Some((pixel, means)), None) => self.point_tool.click(scene, document, pixel, means, pointer.modifiers),
@@ -172,20 +176,25 @@ impl App {
     pub(crate) fn handle(&mut self, event: Option<ToolEvent>) {
         match event {
             None => {}
-            Some(ToolEvent::Edit(edit)) => self.apply_click(edit),
+            Some(ToolEvent::Edit(edit)) => self.click_edits(|app| app.apply_edit(edit)),
             Some(ToolEvent::Select { points, combine }) => {
-                self.select_points(points, combine);
-                self.clicked_revision = self.document().map(Document::revision);
+                self.click_edits(|app| app.select_points(points, combine));
             }
-            Some(ToolEvent::SelectSource { point, extend }) => self.act(Action::SelectSource { point, extend }),
-            Some(ToolEvent::Deselect) => self.deselect(),
+            Some(ToolEvent::SelectSource { point, extend }) => {
+                self.click_edits(|app| app.act(Action::SelectSource { point, extend }));
+            }
+            Some(ToolEvent::Deselect) => self.click_edits(Self::deselect),
             Some(ToolEvent::Pivot(point)) => self.viewport.set_pivot(point),
         }
     }
 
-    fn apply_click(&mut self, edit: Edit) {
-        self.apply_edit(edit);
-        self.clicked_revision = self.document().map(Document::revision);
+    /// Does what a click asks for, and remembers the edit it made for [`Self::take_back_click`]: a click that was refused or changed
+    /// nothing made none, and what was done before it must stay.
+    fn click_edits(&mut self, edit: impl FnOnce(&mut Self)) {
+        let before = self.document().map(Document::revision);
+        edit(self);
+        let after = self.document().map(Document::revision);
+        self.clicked_revision = after.filter(|_| after != before);
     }
 
     /// The pixel that keyboard commands mean: under the pointer, else the middle of the view.
