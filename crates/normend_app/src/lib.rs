@@ -22,6 +22,7 @@ mod pace;
 pub mod paint;
 pub mod panels;
 mod picture_job;
+mod point_ranges;
 mod popup_keys;
 mod recipes;
 mod review;

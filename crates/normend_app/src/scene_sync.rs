@@ -16,6 +16,7 @@ use normend_render::{
     PictureMaker, RenderError, SeenIds, SplatRenderer, UploadedCloud, UploadedColors, wgpu,
 };
 
+use crate::point_ranges;
 use crate::session::Session;
 use crate::source_spheres::SourceSpheres;
 
@@ -136,7 +137,7 @@ impl Scene {
     /// [`RenderError`] when the graphics adapter cannot hold it.
     pub fn show_document(&mut self, session: &mut Session, uploaded: Option<UploadedCloud>) -> Result<(), RenderError> {
         let document = &session.document;
-        let (Some(propagation), Some(orientation)) = (document.propagation(), document.orientation()) else {
+        let Some(propagation) = document.propagation() else {
             return Ok(());
         };
         self.forget_ids();
@@ -146,11 +147,19 @@ impl Scene {
         let (device, queue) = (&self.state.device, &self.state.queue);
         self.renderer.show_cloud(device, queue, uploaded);
         self.tree = Some(tree);
-        self.renderer.set_turned(queue, &orientation.to_words());
+        self.show_state(session);
+        Ok(())
+    }
+
+    /// Shows the signs, what is selected and hidden, and the sources from scratch, on the points that are there. O(n / 32) and what is
+    /// selected and hidden.
+    pub fn show_state(&mut self, session: &mut Session) {
+        if let Some(orientation) = session.document.orientation() {
+            self.renderer.set_turned(&self.state.queue, &orientation.to_words());
+        }
         session.take_toggled();
         self.show_sets(session);
         self.show_sources(session);
-        Ok(())
     }
 
     /// Shows what an edit, an undo or a redo turned, and the sources after it.
@@ -159,8 +168,10 @@ impl Scene {
         match session.take_toggled() {
             Some([selected, hidden]) => {
                 let queue = &self.state.queue;
-                self.renderer.select(queue, &self.ranges_of(&selected));
-                self.renderer.hide(queue, &self.ranges_of(&hidden));
+                let n_points = session.document.cloud().n_points();
+                let [selects, hides] = [&selected, &hidden].map(|set| self.ranges_of(set, n_points));
+                self.renderer.select(queue, &selects);
+                self.renderer.hide(queue, &hides);
                 if !hidden.is_empty() {
                     // What was behind is seen now: earlier picks no longer hold.
                     self.picture_id += 1;
@@ -172,19 +183,16 @@ impl Scene {
         self.show_sources(session);
     }
 
-    /// Shows what is selected and hidden from scratch. O(n / 32) and what is selected and hidden.
+    /// Shows what is selected and hidden from scratch, as fast as [`Self::ranges_of`].
     fn show_sets(&mut self, session: &Session) {
         let document = &session.document;
-        let n_words = document.cloud().n_points().div_ceil(32);
+        let n_points = document.cloud().n_points();
         let [selected, hidden] = [document.selected(), document.hidden()].map(|set| {
-            let mut words = vec![0_u32; n_words];
-            for point in set {
-                let instance = self.instance(point);
-                if let Some(word) = words.get_mut(instance as usize / 32) {
-                    *word |= 1 << (instance % 32);
-                }
+            let mut bits = FixedBitSet::with_capacity(n_points);
+            for range in self.ranges_of(set, n_points) {
+                bits.insert_range(range.start as usize..range.end as usize);
             }
-            words
+            normend_core::Orientation::new(bits).to_words()
         });
         self.renderer.set_selected(&self.state.queue, &selected);
         self.renderer.set_hidden(&self.state.queue, &hidden);
@@ -192,16 +200,12 @@ impl Scene {
         self.ids_version += 1;
     }
 
-    fn instance(&self, point: u32) -> u32 {
-        self.tree.as_ref().map_or(point, |tree| tree.position(point))
-    }
-
-    /// The instances of points, as ranges. O(points · log points).
-    fn ranges_of(&self, points: &PointSet) -> Vec<Range<u32>> {
-        let mut instances: Vec<u32> = points.iter().map(|point| self.instance(point)).collect();
-        instances.sort_unstable();
-        let runs = instances.chunk_by(|&a, &b| a + 1 == b);
-        runs.map(|run| run[0]..run[run.len() - 1] + 1).collect()
+    /// The instances of points out of `n_points`, as ranges. O(n / 64), and the points or else the others, whichever are fewer: all
+    /// points are as cheap as none.
+    fn ranges_of(&self, points: &PointSet, n_points: usize) -> Vec<Range<u32>> {
+        point_ranges::renumbered(points, n_points, |point| {
+            self.tree.as_ref().map_or(point, |tree| tree.position(point))
+        })
     }
 
     /// The points of instances.
@@ -248,6 +252,11 @@ impl Scene {
     pub fn lens(&self) -> Option<Lens> {
         // In full detail: while the camera moves a pixel of the picture may stand for several of the screen.
         self.renderer.lens().filter(|_| self.pixel_side == 1)
+    }
+
+    /// From where the last picture is seen; `None` before the first.
+    pub fn drawn_camera(&self) -> Option<Camera> {
+        self.geometry.map(|geometry| geometry.camera)
     }
 
     /// Bytes uploaded to the graphics adapter so far.

@@ -7,6 +7,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use normend_core::document::Viewer;
 use normend_core::{Document, PointCloud, PointSet, Surroundings, confidence};
 use normend_render::{Camera, IdsRequest, Lens, SeenIds};
 use rayon::prelude::*;
@@ -16,7 +17,7 @@ use crate::scene_sync::Scene;
 use crate::tools::Combine;
 use crate::tools::mask::Mask;
 use crate::tools::painting::Stroke;
-use crate::viewport::Viewport;
+use crate::viewport::{Viewport, viewer_of};
 
 /// What a wish comes to.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,8 +29,13 @@ pub enum Answer {
         /// How it joins what is selected.
         combine: Combine,
     },
-    /// The points that the picture shows, for "What I see faces me".
-    Seen(PointSet),
+    /// The points that a picture shows, for "What I see faces me".
+    Seen {
+        /// The points.
+        points: PointSet,
+        /// From where the picture that was asked is seen; the view may have moved on since.
+        viewer: Viewer,
+    },
     /// These points show their back in the picture.
     Backs(PointSet),
     /// Nothing, for this reason in words.
@@ -49,8 +55,16 @@ struct OfView {
     of: OfPicture,
     /// The picture from here is meant.
     camera: Camera,
-    /// With the version of the ids it was asked with; `None` until there is a picture in full detail to ask.
-    request: Option<(IdsRequest, u64)>,
+    /// `None` until there is a picture in full detail to ask.
+    asked: Option<Asked>,
+}
+
+/// What a picture was asked.
+struct Asked {
+    request: IdsRequest,
+    ids_version: u64,
+    /// The picture is seen from here.
+    camera: Camera,
 }
 
 enum Wish {
@@ -138,11 +152,11 @@ impl Selecting {
 
     fn ask_picture(&mut self, scene: &Scene, viewport: &Viewport, of: OfPicture) {
         // Now, if it can be: the view may move on before earlier wishes are answered.
-        let request = ask(scene, viewport, &of);
+        let asked = ask(scene, viewport, &of);
         self.wishes.push_back(Wish::View(Box::new(OfView {
             of,
             camera: *viewport.camera(),
-            request,
+            asked,
         })));
     }
 
@@ -240,7 +254,7 @@ fn select(points: Result<PointSet, JobError>, combine: Combine) -> Answer {
     }
 }
 
-fn ask(scene: &Scene, viewport: &Viewport, of: &OfPicture) -> Option<(IdsRequest, u64)> {
+fn ask(scene: &Scene, viewport: &Viewport, of: &OfPicture) -> Option<Asked> {
     let (min, size) = match of {
         OfPicture::Stroke(stroke) => {
             let [min, max] = stroke.mask.bounds()?;
@@ -248,13 +262,17 @@ fn ask(scene: &Scene, viewport: &Viewport, of: &OfPicture) -> Option<(IdsRequest
         }
         OfPicture::Seen | OfPicture::Backs => ([0, 0], viewport.view_place().size),
     };
-    Some((scene.read_ids(min, size)?, scene.ids_version()))
+    Some(Asked {
+        request: scene.read_ids(min, size)?,
+        ids_version: scene.ids_version(),
+        camera: scene.drawn_camera()?,
+    })
 }
 
 fn poll_view(scene: &Scene, viewport: &Viewport, document: &Document, wish: &mut OfView) -> Option<Answer> {
-    let OfView { of, camera, request } = wish;
-    let (mut asked, version) = match request.take() {
-        Some(asked) => asked,
+    let OfView { of, camera, asked } = wish;
+    let mut question = match asked.take() {
+        Some(question) => question,
         None if viewport.camera() != camera => {
             return Some(Answer::Failed(
                 "The view moved before it was looked at: nothing was selected. Try again.".to_owned(),
@@ -262,23 +280,26 @@ fn poll_view(scene: &Scene, viewport: &Viewport, document: &Document, wish: &mut
         }
         None => ask(scene, viewport, of)?,
     };
-    if version != scene.ids_version() {
+    if question.ids_version != scene.ids_version() {
         // The ids mean other points now: the next picture is asked.
         return None;
     }
-    let Some(seen) = scene.poll_ids(&mut asked) else {
-        *request = Some((asked, version));
+    let Some(seen) = scene.poll_ids(&mut question.request) else {
+        *asked = Some(question);
         return None;
     };
+    let viewer = viewer_of(&question.camera);
     let points = |holds: &dyn Fn([u32; 2]) -> bool| scene.points_of(&seen_where(&seen, holds));
     Some(match of {
         OfPicture::Stroke(stroke) => Answer::Select {
             points: points(&|pixel| stroke.mask.contains(pixel)),
             combine: stroke.combine,
         },
-        OfPicture::Seen => Answer::Seen(points(&|_| true)),
+        OfPicture::Seen => Answer::Seen {
+            points: points(&|_| true),
+            viewer,
+        },
         OfPicture::Backs => {
-            let viewer = viewport.viewer();
             let positions = document.cloud().positions();
             let shows_back = |point: &u32| {
                 let toward_viewer = viewer.direction_from(positions[*point as usize]);

@@ -1,6 +1,6 @@
 //! What can be done with the selected points, and the commands that select and hide.
 
-use normend_core::document::FlipReason;
+use normend_core::document::{FlipReason, Viewer};
 use normend_core::{Change, Document, Edit, EditError, PointSet};
 
 use crate::app::App;
@@ -30,7 +30,7 @@ pub(crate) fn chosen_points(document: &Document) -> PointSet {
     document.selected() - document.hidden()
 }
 
-/// How many points [`chosen_points`] has; O(n / 65536).
+/// How many points [`chosen_points`] has; O(n / 64) at most, less where few are selected or hidden.
 pub(crate) fn n_chosen_points(document: &Document) -> u64 {
     document.selected().len() - document.selected().intersection_len(document.hidden())
 }
@@ -282,7 +282,7 @@ impl App {
                     self.select_points(points, crate::tools::Combine::Replace);
                     self.messages.note(format!("{} seen from the back.", are(n_points)));
                 }
-                Some(Answer::Seen(points)) => self.propose_seen(&points),
+                Some(Answer::Seen { points, viewer }) => self.propose_seen(&points, viewer),
                 Some(Answer::Failed(reason)) => self.messages.note(reason),
             }
         }
@@ -306,9 +306,8 @@ impl App {
         self.apply_edit(Edit::Select(selected));
     }
 
-    fn propose_seen(&mut self, visible: &PointSet) {
+    fn propose_seen(&mut self, visible: &PointSet, viewer: Viewer) {
         let Some(document) = self.document() else { return };
-        let viewer = self.viewport.viewer();
         let proposed = document
             .seen(visible, viewer)
             .and_then(|edit| edit.map(|edit| Ok((document.preview(&edit)?, edit))).transpose());

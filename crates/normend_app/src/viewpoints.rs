@@ -14,7 +14,7 @@ use crate::app::App;
 use crate::command::Action;
 use crate::panels::side::SideTab;
 use crate::theme;
-use crate::viewport::Viewport;
+use crate::viewport::{Viewport, ground};
 
 /// Most viewpoints: as many as there are usual ones.
 pub const MOST: usize = *VIEWS.end();
@@ -166,9 +166,13 @@ impl App {
                     false,
                 );
                 let color = ui.visuals().strong_text_color();
-                let below = at + Vec2::new(0.0, 12.0);
                 let font = egui::FontId::proportional(12.0);
-                painter.text(below, egui::Align2::CENTER_TOP, "Scanner", font, color);
+                let words = painter.layout_no_wrap("Scanner".to_owned(), font, color);
+                let padding = Vec2::new(6.0, 2.0);
+                let size = words.size() + 2.0 * padding;
+                let min = at + Vec2::new(-0.5 * size.x, 12.0);
+                ground(ui, &painter, Rect::from_min_size(min, size));
+                painter.galley(min + padding, words, color);
             }
         }
         if !Viewpoints::are_asked(document) {

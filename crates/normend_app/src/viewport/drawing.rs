@@ -3,7 +3,7 @@
 use egui::{Event, Modifiers, PointerButton, Pos2, Rect, Ui};
 
 use normend_core::document::Viewer;
-use normend_render::Projection;
+use normend_render::{Camera, Projection};
 
 use super::Viewport;
 
@@ -60,10 +60,7 @@ impl Viewport {
 
     /// From where the picture is seen, in the cloud's own space.
     pub fn viewer(&self) -> Viewer {
-        match self.camera.projection {
-            Projection::Perspective => Viewer::At(self.camera.eye()),
-            Projection::Orthographic => Viewer::Toward(self.camera.back()),
-        }
+        viewer_of(&self.camera)
     }
 
     /// Whether the main button draws instead of turning the view: flying looks with it.
@@ -111,5 +108,13 @@ impl Viewport {
             }
         });
         events
+    }
+}
+
+/// From where a camera sees, in the cloud's own space.
+pub fn viewer_of(camera: &Camera) -> Viewer {
+    match camera.projection {
+        Projection::Perspective => Viewer::At(camera.eye()),
+        Projection::Orthographic => Viewer::Toward(camera.back()),
     }
 }

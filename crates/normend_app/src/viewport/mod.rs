@@ -19,12 +19,12 @@ use normend_render::{Camera, Clip, DrawSettings, Projection, StandardView};
 use crate::pace::Pace;
 use crate::scene_sync::Scene;
 use clip_handles::FaceDrag;
-pub use drawing::{DrawEvent, ViewPlace};
+pub use drawing::{DrawEvent, ViewPlace, viewer_of};
 use flight::Flight;
 use fly::Fly;
 pub use gizmo::WIDTH as GIZMO_WIDTH;
 use hold::Hold;
-pub use overlay::{HALO as LINE_HALO, LINE};
+pub use overlay::{HALO as LINE_HALO, LINE, ground};
 pub use preferences::{Navigation, NavigationSettings, Touchpad};
 
 /// A pixel of the view, physical, from its top left corner.

@@ -94,14 +94,19 @@ impl Viewport {
         if min.y + size.y > self.rect.bottom() {
             min.y = pointer.y - 8.0 - size.y;
         }
-        let rect = Rect::from_min_size(min, size);
-        painter.rect(
-            rect,
-            5.0,
-            ui.visuals().window_fill,
-            ui.visuals().window_stroke,
-            StrokeKind::Inside,
-        );
+        ground(ui, &painter, Rect::from_min_size(min, size));
         painter.galley(min + padding, galley, color);
     }
+}
+
+/// What words over the picture stand on, so that they are read on any colors.
+pub fn ground(ui: &Ui, painter: &egui::Painter, rect: Rect) {
+    let visuals = ui.visuals();
+    painter.rect(
+        rect,
+        5.0,
+        visuals.window_fill,
+        visuals.window_stroke,
+        StrokeKind::Inside,
+    );
 }
