@@ -91,11 +91,6 @@ impl Coloring {
     pub fn depends_on_signs(self) -> bool {
         matches!(self, Self::Conflict | Self::Regions)
     }
-
-    /// Whether it shows a number a point, which has a scale and a histogram.
-    pub fn has_values(self) -> bool {
-        matches!(self, Self::Confidence | Self::Scalar)
-    }
 }
 
 /// A color as displayed: red, green, blue in 0..=1.

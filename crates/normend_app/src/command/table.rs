@@ -144,7 +144,7 @@ commands! {
     RemoveSources: Mend 2, "Remove sources", "Remove the selected sources", [key(Key::Delete), key(Key::Backspace)];
     NextSuspect: Mend 3, "Next suspect", "Fly to the next patch that probably points to the wrong side", [key(Key::N)];
     PreviousSuspect: Mend 3, "Previous suspect", "Fly to the suspect before", [shift(Key::N)];
-    FlipSuspect: Mend 3, "Flip suspect", "Turn the suspect in the view, and go on to the next (Enter does so too)", [];
+    FlipSuspect: Mend 3, "Flip suspect", "Turn the suspect in the view, and go on to the next; Mend here does so too", [];
     AcceptSuspect: Mend 3, "Accept suspect",
         "The suspect in the view is right as it is: it is not listed again", [key(Key::Space)];
     FindSuspects: Mend 3, "Look for suspects", "Look for what seems wrong, with the signs as they are now", [];

@@ -68,12 +68,21 @@ pub fn ui(
                 ui.label(RichText::new("·").weak());
                 let mut text = format!("A click turns {}", theme::counted(n_points, "point", "points"));
                 if let Some((level, n_levels)) = level {
-                    text += &format!(" (patch size {level} of {n_levels}, [ and ] change it)");
+                    text += &format!(" (patch size {level} of {n_levels}{})", keys_of_size(ui.ctx()));
                 }
                 ui.label(RichText::new(text).color(theme::accent(ui)));
             }
         });
     });
+}
+
+/// ", [ and ] change it" with the keys as they are, or nothing where the user took them away.
+fn keys_of_size(ctx: &egui::Context) -> String {
+    let keys = [Command::SmallerPatch, Command::LargerPatch].map(|command| command.key_text(ctx));
+    match keys {
+        [Some(smaller), Some(larger)] => format!(", {smaller} and {larger} change it"),
+        _ => String::new(),
+    }
 }
 
 /// How the tool is used, from its own rows; as many as there is room for.

@@ -252,7 +252,12 @@ impl ViewTab<'_> {
 
     fn picture(&mut self, ui: &mut Ui) {
         theme::rows(ui, "picture", |ui| {
-            theme::input_row(ui, "Splat size", "Factor on the size of all splats (+ and −)", |ui| {
+            let mut tooltip = "Factor on the size of all splats".to_owned();
+            let keys = [Command::LargerSplats, Command::SmallerSplats].map(|command| command.key_text(ui.ctx()));
+            if let [Some(larger), Some(smaller)] = keys {
+                tooltip += &format!(" ({larger} and {smaller})");
+            }
+            theme::input_row(ui, "Splat size", &tooltip, |ui| {
                 ui.add(
                     Slider::new(&mut self.settings.splat_scale, SPLAT_SCALES)
                         .logarithmic(true)
