@@ -4,6 +4,7 @@ use normend_core::Document;
 
 use crate::app::App;
 use crate::command::Command;
+use crate::session::Session;
 use crate::work::Work;
 
 impl App {
@@ -19,7 +20,12 @@ impl App {
             Command::Export => {
                 check(document.is_some(), "no scan is open")?;
                 check(self.work.is_none(), "wait for the running work, or cancel it")?;
-                check(is_oriented, "the scan is not oriented yet")
+                check(is_oriented, "the scan is not oriented yet")?;
+                let is_due = self.session.as_ref().is_some_and(Session::is_due);
+                check(
+                    !is_due,
+                    "the normals are not those of the present parameters: press Propagate, or undo",
+                )
             }
             Command::OpenRecipe | Command::OpenRecipePath | Command::SaveRecipe => {
                 check(document.is_some(), "no scan is open")?;

@@ -8,7 +8,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use egui::Ui;
-use normend_core::Change;
 use normend_io::recipe::{self, End, Recipe};
 
 use crate::app::App;
@@ -111,11 +110,26 @@ impl App {
             }
             _ => Edits::None,
         });
-        let has_offers = self.session.as_ref().is_some_and(|session| !session.offers.is_empty());
-        if has_offers && self.windows.modal.is_none() && self.recipe_job.is_none() {
-            self.windows.modal = Some(Modal::Restore);
-        }
+        self.offer_journals();
         self.take_recipe_job();
+    }
+
+    /// Asks what becomes of the journals that were found, unless there are edits already that they would be mixed with.
+    fn offer_journals(&mut self) {
+        let Some(session) = self.session.as_ref().filter(|session| !session.offers.is_empty()) else {
+            return;
+        };
+        let is_asked = matches!(self.windows.modal, Some(Modal::Restore));
+        if !is_asked && (self.windows.modal.is_some() || self.recipe_job.is_some()) {
+            return;
+        }
+        let is_new = session.document.steps().next().is_none();
+        self.windows.modal = is_new.then_some(Modal::Restore);
+        if !is_new {
+            self.decide_later();
+            self.messages
+                .note("There are edits of before, but this scan has new ones already: open it again to restore those.");
+        }
     }
 
     /// Lets go of the journals that are offered; they are offered again when the scan is opened the next time.
@@ -170,12 +184,14 @@ impl App {
                 "The journal was damaged, and what came after that is not restored: {damage}. The damaged file is kept beside it."
             ));
         }
-        self.show_state();
+        if let (Some(scene), Some(session)) = (&mut self.scene, &mut self.session) {
+            scene.show_state(session);
+        }
+        self.orient_as_wanted();
     }
 
-    /// Shows the document after its state was changed as a whole, and orients it as it wants.
-    fn show_state(&mut self) {
-        self.show_change(&Change::default(), true);
+    /// Orients the document with the parameters that it wants after its state was changed as a whole.
+    fn orient_as_wanted(&mut self) {
         let Some(session) = &mut self.session else { return };
         let wanted = session.document.parameters();
         session.draft = wanted;
@@ -188,21 +204,6 @@ impl App {
         };
         if !is_on_its_way && !matches!(self.work, Some(Work::Export { .. })) {
             self.act(Action::Propagate(wanted));
-        }
-    }
-
-    /// Tells the view what turned; `is_whole` when it is not known.
-    fn show_change(&mut self, change: &Change, is_whole: bool) {
-        let (Some(scene), Some(session)) = (&mut self.scene, &mut self.session) else {
-            return;
-        };
-        if !is_whole {
-            scene.apply(change, session);
-        } else if session.document.propagation().is_some()
-            && let Err(error) = scene.show_document(session, None)
-        {
-            self.messages
-                .error(format!("The edits are made but cannot be shown: {error}."));
         }
     }
 
@@ -241,6 +242,9 @@ impl App {
         };
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
         let offer = if of_offer { session.offers.pop_front() } else { None };
+        if of_offer && offer.is_none() {
+            return;
+        }
         let offer = offer.map(Box::new);
         let recipe = match &offer {
             Some(offer) => offer.reading.recipe.clone(),
@@ -351,8 +355,10 @@ impl App {
         match session.take_recipe(recipe) {
             Ok(change) => {
                 self.messages.info(format!("Applied {name}; one undo takes it back."));
-                self.show_change(&change, false);
-                self.show_state();
+                if let Some(scene) = &mut self.scene {
+                    scene.apply(&change, session);
+                }
+                self.orient_as_wanted();
             }
             Err(error) => self.messages.error(format!("{name} was not applied: {error}.")),
         }

@@ -1,5 +1,7 @@
 //! One open scan: the file, the document made of it, and what the user has chosen but not applied yet.
 
+use std::cell::Cell;
+use std::cmp::Ordering;
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,7 +11,7 @@ use normend_core::{
     Change, Document, Edit, EditError, EditKind, Parameters, PointSet, Propagation, SpanningTree, Start, StateChange,
 };
 use normend_io::Scan;
-use normend_io::recipe::{Head, Recipe, RecordedStep, ScanIdentity};
+use normend_io::recipe::{Event, Head, Recipe, RecordedStep, ScanIdentity};
 
 use crate::components::Components;
 use crate::journal::Journal;
@@ -38,6 +40,8 @@ pub struct Session {
     pub n_without_normal: usize,
     /// Components whose right side nothing tells but a source of the user, ascending, as indices of the tree's roots.
     undecided: Vec<usize>,
+    /// How many of them are left, and the document's revision it was counted at.
+    counted_undecided: Cell<Option<(u64, usize)>>,
     saved_revision: u64,
     /// Clicks, strokes and verbs so far; undo takes none back.
     pub n_interactions: u64,
@@ -46,8 +50,8 @@ pub struct Session {
     toggled: Option<[PointSet; 2]>,
     /// What turned with each change since colors and marks were last brought in step.
     pub turned: Vec<Change>,
-    /// An exported file has the edits up to some moment.
-    was_exported: bool,
+    /// What was accepted when the newest edits were last exported.
+    exported_accepted: PointSet,
     /// Where edits are written as they happen; `None` without a folder for it.
     pub journal: Option<Journal>,
     /// The user wants none of the edits so far; only until the next.
@@ -89,11 +93,12 @@ impl Session {
             reveal: None,
             n_without_normal,
             undecided: Vec::new(),
+            counted_undecided: Cell::new(None),
             saved_revision: document.signs_revision(),
             n_interactions: 0,
             toggled: None,
             turned: Vec::new(),
-            was_exported: false,
+            exported_accepted: PointSet::new(),
             journal: None,
             is_discarded: false,
             offers: VecDeque::new(),
@@ -117,6 +122,16 @@ impl Session {
         self.document.signs_revision() != self.saved_revision
     }
 
+    /// Whether the signs are not those that the state asks for: other parameters, or viewpoints that vote, are wanted than those in
+    /// force. A propagation is due then.
+    pub fn is_due(&self) -> bool {
+        let Some(propagation) = self.document.propagation() else {
+            return true;
+        };
+        let has_old_votes = propagation.votes.is_some() && self.document.state().viewpoints != propagation.viewpoints;
+        self.document.parameters() != propagation.parameters || has_old_votes
+    }
+
     /// Whether there are mends among what is unsaved; else other parameters alone.
     pub fn has_unsaved_mends(&self) -> bool {
         let mends = |step: &Step| step.change().is_of_signs() && step.kind() != EditKind::SetParameters;
@@ -131,8 +146,10 @@ impl Session {
     /// Remembers that the signs of `revision` are in an exported file.
     pub fn mark_saved(&mut self, revision: u64) {
         self.saved_revision = revision;
-        self.was_exported = true;
         let is_newest = !self.is_unsaved();
+        if is_newest {
+            self.exported_accepted = self.document.state().accepted.clone();
+        }
         if let Some(journal) = self.journal.as_mut().filter(|_| is_newest) {
             journal.exported();
         }
@@ -166,6 +183,11 @@ impl Session {
         for _ in n_done..steps.len() {
             self.turned.extend(self.document.undo());
         }
+        let kinds = offer.reading.recipe.events.iter().filter_map(|event| match event {
+            Event::Step(step) => Some(step.kind),
+            _ => None,
+        });
+        self.n_interactions = kinds.filter(|&kind| is_interaction(kind)).count() as u64;
         self.journal = Some(Journal::resume(offer));
         Ok(())
     }
@@ -194,6 +216,9 @@ impl Session {
         let before = self.document.revision();
         let change = self.make_again(step)?;
         self.record(before);
+        if self.document.revision() != before {
+            self.n_interactions += u64::from(is_interaction(step.kind));
+        }
         self.prune_selection();
         Ok(change)
     }
@@ -214,7 +239,8 @@ impl Session {
 
     /// Ends the session: the journal goes, unless it has edits that no exported file has and that the user has not given up.
     pub fn finish(mut self) {
-        let has_more = self.is_unsaved() || (!self.was_exported && !self.document.state().accepted.is_empty());
+        // No exported file tells what was accepted, but with the export the work was done up to there.
+        let has_more = self.is_unsaved() || self.document.state().accepted != self.exported_accepted;
         if let Some(journal) = self.journal.take().filter(|_| self.is_discarded || !has_more) {
             journal.remove();
         }
@@ -240,8 +266,9 @@ impl Session {
     /// Makes a propagation the one in force. The first is what the file is without the user, so it is nothing to lose.
     pub fn install(&mut self, propagation: Propagation) {
         let voted: BTreeSet<usize> = (propagation.voted_sources.iter())
-            .map(|source| component(&propagation.tree, source.point))
+            .map(|source| component_of(&propagation.tree, source.point))
             .collect();
+        self.counted_undecided.set(None);
         self.undecided = (propagation.sides.iter().enumerate())
             .filter(|(component, side)| side.rule.is_none() && !voted.contains(component))
             .map(|(component, _)| component)
@@ -256,13 +283,28 @@ impl Session {
         self.document.install(propagation);
     }
 
-    /// How many components could face either way: nothing tells their right side, and the user has not said it.
+    /// How many components could face either way: nothing tells their right side, and the user has not said it. Counted anew only
+    /// after an edit or another propagation, so it may be asked in each frame.
     pub fn n_undecided(&self) -> usize {
+        let revision = self.document.revision();
+        if let Some((_, n_undecided)) = self
+            .counted_undecided
+            .get()
+            .filter(|&(counted_at, _)| counted_at == revision)
+        {
+            return n_undecided;
+        }
+        let n_undecided = self.count_undecided();
+        self.counted_undecided.set(Some((revision, n_undecided)));
+        n_undecided
+    }
+
+    fn count_undecided(&self) -> usize {
         let Some(propagation) = self.document.propagation().filter(|_| !self.undecided.is_empty()) else {
             return 0;
         };
         let said: BTreeSet<usize> = (self.document.sources().iter())
-            .map(|source| component(&propagation.tree, source.point))
+            .map(|source| component_of(&propagation.tree, source.point))
             .collect();
         self.undecided
             .iter()
@@ -279,10 +321,7 @@ impl Session {
             Edit::Mend(point) | Edit::TurnPatch { point, .. } | Edit::TurnWhole(point) => Some(point),
             _ => None,
         };
-        let is_interaction = !matches!(
-            edit.kind(),
-            EditKind::SetParameters | EditKind::SetViewpoints | EditKind::Accept
-        );
+        let is_interaction = is_interaction(edit.kind());
         let before = self.document.revision();
         let change = self.document.apply(edit)?;
         self.turned.push(change.clone());
@@ -322,6 +361,21 @@ impl Session {
         }
         self.prune_selection();
         change
+    }
+
+    /// Takes steps back, or does them again, until so many are done or none is left; returns what turned on the whole, `None` when
+    /// no step was taken. O(what the steps changed).
+    pub fn go_to_step(&mut self, n_steps: usize) -> Option<Change> {
+        let mut flips = Vec::new();
+        let before = self.document.n_done();
+        while let Some(change) = match self.document.n_done().cmp(&n_steps) {
+            Ordering::Less => self.redo(),
+            Ordering::Equal => None,
+            Ordering::Greater => self.undo(),
+        } {
+            flips.extend_from_slice(change.ranges());
+        }
+        (self.document.n_done() != before).then(|| Change::from_flips(&flips))
     }
 
     fn prune_selection(&mut self) {
@@ -377,6 +431,14 @@ impl Session {
     }
 }
 
+/// Whether an edit of this kind is a click, a stroke or a verb, which the user's effort is counted by.
+fn is_interaction(kind: EditKind) -> bool {
+    !matches!(
+        kind,
+        EditKind::SetParameters | EditKind::SetViewpoints | EditKind::Accept
+    )
+}
+
 /// What is toggled once a step was made or taken back as well. O(what it toggles, and what was toggled before).
 fn toggled_with(toggled: Option<[PointSet; 2]>, step: Option<&Step>) -> Option<[PointSet; 2]> {
     let [selected, hidden] = toggled?;
@@ -385,10 +447,8 @@ fn toggled_with(toggled: Option<[PointSet; 2]>, step: Option<&Step>) -> Option<[
 }
 
 /// The component that `point` belongs to, as an index of the tree's roots. O(log components).
-fn component(tree: &SpanningTree, point: u32) -> usize {
-    let position = tree.position(point);
-    // The first root is at position 0, so at least one counts.
-    tree.roots().partition_point(|&root| root <= position) - 1
+fn component_of(tree: &SpanningTree, point: u32) -> usize {
+    tree.component(tree.position(point))
 }
 
 /// The user's folder for documents, else the home folder.

@@ -184,7 +184,9 @@ impl Work {
 
     /// Starts to write the oriented scan; `None` when it is not oriented yet.
     pub fn export(ctx: &egui::Context, session: &Session, path: &Path, overwrite_input: bool) -> Option<Self> {
-        let normals = session.document.oriented_normals()?;
+        // A bit a point; what takes long is left to the job.
+        let orientation = session.document.orientation()?.clone();
+        let propagation = session.document.shared_propagation()?;
         let scan = Arc::clone(&session.scan);
         let options = WriteOptions {
             rule: session.rule()?,
@@ -192,6 +194,7 @@ impl Work {
         };
         let target = path.to_path_buf();
         let job = Job::start(ctx, "export", "Writing", move |progress| {
+            let normals = propagation.oriented_normals(&orientation);
             scan.write(&normals, &target, &options, progress)
                 .map_err(|error| match error {
                     WriteError::Cancelled(_) => JobError::Cancelled,

@@ -14,6 +14,7 @@ use std::time::Instant;
 
 use fixedbitset::FixedBitSet;
 use glam::Vec3;
+use rayon::prelude::*;
 
 use self::given::GivenNormals;
 pub use self::method::Method;
@@ -26,8 +27,8 @@ use crate::progress::Part;
 use crate::side_rule::{Clues, Side};
 use crate::visibility::SortedVotes;
 use crate::{
-    Cancelled, EdgeRule, Estimator, Neighbors, Patches, PointCloud, Progress, Regions, RiemannianGraph, SideRule,
-    Source, SpanningTree, normals, visibility,
+    Cancelled, EdgeRule, Estimator, Neighbors, Orientation, Patches, PointCloud, Progress, Regions, RiemannianGraph,
+    SideRule, Source, SpanningTree, normals, visibility,
 };
 
 /// Which normals and signs a document starts from.
@@ -201,6 +202,16 @@ pub struct Propagation {
 }
 
 impl Propagation {
+    /// `n` oriented unit normals by point, turned where `orientation` says so. O(n), in parallel.
+    pub fn oriented_normals(&self, orientation: &Orientation) -> Vec<Vec3> {
+        let normals = (0..self.tree.n_points() as u32).into_par_iter().map(|point| {
+            let stored = self.normals[point as usize];
+            let is_turned = orientation.is_turned(self.tree.position(point));
+            if is_turned { -stored } else { stored }
+        });
+        normals.collect()
+    }
+
     /// Runs neighbors → normals → graph → tree → initial cuts. `known` is what is known besides, such as the file's
     /// normals; without one that can be used [`Start::Keep`] is the same as [`Start::Estimate`].
     ///

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::spread::{self, Anchor};
-use super::{Derived, Document, Edit, EditError, Mark, StateChange, check_direction};
+use super::{Derived, Document, Edit, EditError, Mark, StateChange, check_direction, check_viewpoints};
 use crate::sources::Origin;
 use crate::{PointSet, Source};
 
@@ -80,10 +80,13 @@ impl Document {
                 parameters: Some(parameters).filter(|&wanted| wanted != self.state.parameters),
                 ..StateChange::default()
             },
-            Edit::SetViewpoints(places) => StateChange {
-                viewpoints: Some(Arc::clone(places)).filter(|wanted| *wanted != self.state.viewpoints),
-                ..StateChange::default()
-            },
+            Edit::SetViewpoints(places) => {
+                check_viewpoints(places)?;
+                StateChange {
+                    viewpoints: Some(Arc::clone(places)).filter(|wanted| *wanted != self.state.viewpoints),
+                    ..StateChange::default()
+                }
+            }
         })
     }
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+use crate::propagation::VIEWS;
 use crate::sources::Origin;
 use crate::{Parameters, PointSet, Source};
 
@@ -282,5 +283,17 @@ pub enum EditError {
     NoDirection {
         /// The id.
         point: u32,
+    },
+    /// A viewpoint is not a place.
+    #[error("viewpoint {} is nowhere: its coordinates must be finite numbers", index + 1)]
+    NoPlace {
+        /// Which one, from 0.
+        index: usize,
+    },
+    /// There are more viewpoints than can vote.
+    #[error("{n_viewpoints} viewpoints are too many: at most {} can vote", VIEWS.end())]
+    TooManyViewpoints {
+        /// How many.
+        n_viewpoints: usize,
     },
 }

@@ -11,9 +11,9 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use crate::patches::{Offer, Patch};
+use crate::propagation::VIEWS;
 use crate::sources::{Origin, SourcePatch};
 use crate::{Change, Orientation, Parameters, PointCloud, PointSet, Propagation, Regions, Source, Sources};
 
@@ -352,6 +352,7 @@ impl Document {
         for (point, normal) in sources.chain(marks) {
             check_direction(point, normal)?;
         }
+        check_viewpoints(change.viewpoints.as_deref().unwrap_or_default())?;
         Ok(self.perform(kind, change, Some(n_turned)))
     }
 
@@ -522,13 +523,7 @@ impl Document {
     /// `n` oriented unit normals by point: O(n), in parallel; for export.
     pub fn oriented_normals(&self) -> Option<Vec<Vec3>> {
         let derived = self.derived.as_ref()?;
-        let points = 0..self.cloud.n_points() as u32;
-        Some(
-            points
-                .into_par_iter()
-                .map(|point| derived.oriented_normal(point))
-                .collect(),
-        )
+        Some(derived.propagation.oriented_normals(derived.overlay.shown()))
     }
 
     fn check_point(&self, point: u32) -> Result<(), EditError> {
@@ -595,6 +590,17 @@ fn make(
     } = derived;
     let shown = overlay.show(propagation, regions, &state.marks, &turned, marked);
     (shown, backward)
+}
+
+fn check_viewpoints(places: &[Vec3]) -> Result<(), EditError> {
+    if let Some(index) = places.iter().position(|place| !place.is_finite()) {
+        return Err(EditError::NoPlace { index });
+    }
+    if places.len() > *VIEWS.end() {
+        let n_viewpoints = places.len();
+        return Err(EditError::TooManyViewpoints { n_viewpoints });
+    }
+    Ok(())
 }
 
 fn check_direction(point: u32, normal: Vec3) -> Result<(), EditError> {

@@ -280,5 +280,18 @@ fn recorded_changes_that_do_not_fit_are_refused() {
     };
     let no_direction = EditError::NoDirection { point: 3 };
     assert_eq!(document.apply_recorded(EditKind::Pin, nowhere, 0), Err(no_direction));
+    let beyond = Vec3::new(0.0, f32::INFINITY, 0.0);
+    for (places, expect) in [
+        (vec![Vec3::ZERO, beyond], EditError::NoPlace { index: 1 }),
+        (vec![Vec3::ZERO; 27], EditError::TooManyViewpoints { n_viewpoints: 27 }),
+    ] {
+        let change = StateChange {
+            viewpoints: Some(places.clone().into()),
+            ..StateChange::default()
+        };
+        let recorded = document.apply_recorded(EditKind::SetViewpoints, change, 0);
+        assert_eq!(recorded, Err(expect.clone()));
+        assert_eq!(document.apply(Edit::SetViewpoints(places.into())), Err(expect));
+    }
     assert!(document.next_undo().is_none());
 }
