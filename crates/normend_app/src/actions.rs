@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use normend_core::{Edit, Start};
+use normend_core::{Edit, Propagation, Start};
 
 use crate::app::{App, Leaving};
 use crate::command::{Action, Command};
@@ -98,11 +98,11 @@ impl App {
                 }
             }
             Action::ExportTo { path, overwrite_input } => {
-                let Some(session) = self.session.as_ref().filter(|_| self.work.is_none()) else {
-                    self.messages
-                        .error("Nothing was exported: other work is running. Wait for it, or cancel it.");
+                if let Err(reason) = self.availability(Command::Export) {
+                    self.messages.error(format!("Nothing was exported: {reason}."));
                     return;
-                };
+                }
+                let Some(session) = &self.session else { return };
                 // A relative path means the folder that the editor was started in; the message names it in full.
                 let path = std::path::absolute(&path).unwrap_or(path);
                 self.work = Work::export(&self.ctx, session, &path, overwrite_input);
@@ -383,18 +383,15 @@ impl App {
     /// Orients again when the document wants other parameters than those in force, as after they were taken back.
     pub(crate) fn keep_oriented(&mut self) {
         let Some(session) = &mut self.session else { return };
-        let wanted = session.document.parameters();
-        let Some(propagation) = session.document.propagation() else {
+        if session.document.propagation().is_none() {
             return;
-        };
-        let in_force = propagation.parameters;
-        // Viewpoints matter where they vote.
+        }
+        let (wanted, is_due) = (session.document.parameters(), session.is_due());
         let places = &session.document.state().viewpoints;
-        let are_old = propagation.votes.is_some() && *places != propagation.viewpoints;
         let are_new = *places != session.requested_viewpoints;
         match &self.work {
-            None if wanted != in_force && wanted != session.requested => {}
-            None if are_old && are_new => {}
+            None if wanted != session.requested => {}
+            None if is_due && are_new => {}
             Some(Work::Propagate { is_asked: false, .. }) if are_new => {}
             // The running one is for parameters that were taken back meanwhile.
             Some(Work::Propagate {
@@ -407,7 +404,7 @@ impl App {
         (session.draft, session.requested) = (wanted, wanted);
         session.requested_viewpoints = Arc::clone(places);
         self.work = None;
-        if wanted != in_force || are_old {
+        if is_due {
             let uploader = self.scene.as_ref().map(Scene::uploader);
             let work = Work::propagate(&self.ctx, &session.document, wanted, false, uploader);
             self.work = Some(work);
@@ -516,14 +513,15 @@ impl App {
                         is_asked,
                     });
                 }
+                // What the document wanted may have been undone in the last frame; as a step it would end what can be done again.
+                Some(Ok(propagation)) if !is_asked && !self.is_wanted(&propagation.result) => {}
                 Some(Ok(propagation)) => self.install(propagation),
                 Some(Err(error)) => {
                     self.say_why("The scan was not oriented", error);
                     if let Some(session) = &mut self.session
                         && is_asked
-                        && let Some(propagation) = session.document.propagation()
                     {
-                        session.requested = propagation.parameters;
+                        session.requested = session.document.parameters();
                     }
                 }
             },
@@ -588,6 +586,8 @@ impl App {
             let is_again = before.identity().is_same_content(&session.identity());
             before.finish();
             if is_again {
+                // These hold the locks of those that are to be found.
+                drop(std::mem::take(&mut findings));
                 findings = self.find_again(&session);
             }
         }
@@ -615,15 +615,22 @@ impl App {
         self.take_findings(findings);
     }
 
+    /// Whether a propagation is made as the document wants it now.
+    fn is_wanted(&self, propagation: &Propagation) -> bool {
+        self.document().is_some_and(|document| {
+            document.parameters() == propagation.parameters && document.state().viewpoints == propagation.viewpoints
+        })
+    }
+
     /// Shows the open scan as another propagation of it orients it, just as a finished job does.
-    pub fn show_propagation(&mut self, propagation: normend_core::Propagation) {
+    pub fn show_propagation(&mut self, propagation: Propagation) {
         self.install(Uploaded {
             result: propagation,
             cloud: None,
         });
     }
 
-    fn install(&mut self, propagation: Uploaded<normend_core::Propagation>) {
+    fn install(&mut self, propagation: Uploaded<Propagation>) {
         self.forget_what_is_under_way();
         let Some(session) = &mut self.session else { return };
         let Uploaded {

@@ -11,7 +11,7 @@ use normend_core::{
     Change, Document, Edit, EditError, EditKind, Parameters, PointSet, Propagation, SpanningTree, Start, StateChange,
 };
 use normend_io::Scan;
-use normend_io::recipe::{Head, Recipe, RecordedStep, ScanIdentity};
+use normend_io::recipe::{Event, Head, Recipe, RecordedStep, ScanIdentity};
 
 use crate::components::Components;
 use crate::journal::Journal;
@@ -50,8 +50,8 @@ pub struct Session {
     toggled: Option<[PointSet; 2]>,
     /// What turned with each change since colors and marks were last brought in step.
     pub turned: Vec<Change>,
-    /// An exported file has the edits up to some moment.
-    was_exported: bool,
+    /// What was accepted when the newest edits were last exported.
+    exported_accepted: PointSet,
     /// Where edits are written as they happen; `None` without a folder for it.
     pub journal: Option<Journal>,
     /// The user wants none of the edits so far; only until the next.
@@ -98,7 +98,7 @@ impl Session {
             n_interactions: 0,
             toggled: None,
             turned: Vec::new(),
-            was_exported: false,
+            exported_accepted: PointSet::new(),
             journal: None,
             is_discarded: false,
             offers: VecDeque::new(),
@@ -122,6 +122,16 @@ impl Session {
         self.document.signs_revision() != self.saved_revision
     }
 
+    /// Whether the signs are not those that the state asks for: other parameters, or viewpoints that vote, are wanted than those in
+    /// force. A propagation is due then.
+    pub fn is_due(&self) -> bool {
+        let Some(propagation) = self.document.propagation() else {
+            return true;
+        };
+        let has_old_votes = propagation.votes.is_some() && self.document.state().viewpoints != propagation.viewpoints;
+        self.document.parameters() != propagation.parameters || has_old_votes
+    }
+
     /// Whether there are mends among what is unsaved; else other parameters alone.
     pub fn has_unsaved_mends(&self) -> bool {
         let mends = |step: &Step| step.change().is_of_signs() && step.kind() != EditKind::SetParameters;
@@ -136,8 +146,10 @@ impl Session {
     /// Remembers that the signs of `revision` are in an exported file.
     pub fn mark_saved(&mut self, revision: u64) {
         self.saved_revision = revision;
-        self.was_exported = true;
         let is_newest = !self.is_unsaved();
+        if is_newest {
+            self.exported_accepted = self.document.state().accepted.clone();
+        }
         if let Some(journal) = self.journal.as_mut().filter(|_| is_newest) {
             journal.exported();
         }
@@ -171,6 +183,11 @@ impl Session {
         for _ in n_done..steps.len() {
             self.turned.extend(self.document.undo());
         }
+        let kinds = offer.reading.recipe.events.iter().filter_map(|event| match event {
+            Event::Step(step) => Some(step.kind),
+            _ => None,
+        });
+        self.n_interactions = kinds.filter(|&kind| is_interaction(kind)).count() as u64;
         self.journal = Some(Journal::resume(offer));
         Ok(())
     }
@@ -199,6 +216,9 @@ impl Session {
         let before = self.document.revision();
         let change = self.make_again(step)?;
         self.record(before);
+        if self.document.revision() != before {
+            self.n_interactions += u64::from(is_interaction(step.kind));
+        }
         self.prune_selection();
         Ok(change)
     }
@@ -219,7 +239,8 @@ impl Session {
 
     /// Ends the session: the journal goes, unless it has edits that no exported file has and that the user has not given up.
     pub fn finish(mut self) {
-        let has_more = self.is_unsaved() || (!self.was_exported && !self.document.state().accepted.is_empty());
+        // No exported file tells what was accepted, but with the export the work was done up to there.
+        let has_more = self.is_unsaved() || self.document.state().accepted != self.exported_accepted;
         if let Some(journal) = self.journal.take().filter(|_| self.is_discarded || !has_more) {
             journal.remove();
         }
@@ -300,10 +321,7 @@ impl Session {
             Edit::Mend(point) | Edit::TurnPatch { point, .. } | Edit::TurnWhole(point) => Some(point),
             _ => None,
         };
-        let is_interaction = !matches!(
-            edit.kind(),
-            EditKind::SetParameters | EditKind::SetViewpoints | EditKind::Accept
-        );
+        let is_interaction = is_interaction(edit.kind());
         let before = self.document.revision();
         let change = self.document.apply(edit)?;
         self.turned.push(change.clone());
@@ -411,6 +429,14 @@ impl Session {
             .unwrap_or_default();
         folder.join(format!("{stem}_oriented.{extension}"))
     }
+}
+
+/// Whether an edit of this kind is a click, a stroke or a verb, which the user's effort is counted by.
+fn is_interaction(kind: EditKind) -> bool {
+    !matches!(
+        kind,
+        EditKind::SetParameters | EditKind::SetViewpoints | EditKind::Accept
+    )
 }
 
 /// What is toggled once a step was made or taken back as well. O(what it toggles, and what was toggled before).
