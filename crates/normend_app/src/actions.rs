@@ -494,6 +494,8 @@ impl App {
     pub(crate) fn take_work(&mut self) {
         match self.work.take() {
             None => {}
+            // What is saved is of the scan that is open until then.
+            Some(work @ Work::Open { .. }) if self.is_saving() => self.work = Some(work),
             Some(Work::Open { job, origin }) => match job.poll() {
                 None => self.work = Some(Work::Open { job, origin }),
                 Some(Ok(scan)) => self.show_scan(scan, &origin),
@@ -579,17 +581,13 @@ impl App {
         if let ScanOrigin::File(path) = origin {
             self.settings.settings.remember_scan(path);
         }
-        let Opened { scan, mut findings } = opened.result;
+        let Opened { scan, findings } = opened.result;
         let session = Session::new(scan, origin.name());
         self.recipe_job = None;
-        if let Some(before) = self.session.take() {
-            let is_again = before.identity().is_same_content(&session.identity());
+        let before = self.session.take();
+        let is_again = (before.as_ref()).is_some_and(|before| before.identity().is_same_content(&session.identity()));
+        if let Some(before) = before {
             before.finish();
-            if is_again {
-                // These hold the locks of those that are to be found.
-                drop(std::mem::take(&mut findings));
-                findings = self.find_again(&session);
-            }
         }
         self.viewport.look_at(session.document.cloud());
         self.display.show_scan(&session.scan);
@@ -609,10 +607,18 @@ impl App {
             ));
         }
         let parameters = session.draft;
-        crash::set_scan(session.scan.path().map(std::path::PathBuf::as_path));
+        let path = session.scan.path().cloned();
+        crash::set_scan(path.map_or_else(|| origin.clone(), ScanOrigin::File));
         self.session = Some(session);
         self.act(Action::Propagate(parameters));
-        self.take_findings(findings);
+        self.begin_journal();
+        if is_again {
+            // These hold the locks of those that are to be found.
+            drop(findings);
+            self.find_again();
+        } else {
+            self.take_findings(findings);
+        }
     }
 
     /// Whether a propagation is made as the document wants it now.

@@ -512,7 +512,14 @@ impl App {
     }
 
     fn answer_close_request(&mut self) {
-        if self.quitting || !self.ctx.input(|input| input.viewport().close_requested()) {
+        if !self.ctx.input(|input| input.viewport().close_requested()) {
+            return;
+        }
+        if self.closes_when_saved() {
+            self.ctx.send_viewport_cmd(egui::ViewportCommand::CancelClose);
+            return;
+        }
+        if self.quitting {
             return;
         }
         if matches!(self.work, Some(Work::Export { .. })) {

@@ -13,6 +13,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::folders;
+use crate::work::ScanOrigin;
 
 /// Messages that a report repeats.
 const N_MESSAGES: usize = 20;
@@ -20,6 +21,10 @@ const N_MESSAGES: usize = 20;
 const N_REPORTS: usize = 10;
 /// Set for an editor that came up again by itself.
 const RESTARTED_VARIABLE: &str = "NORMEND_RESTARTED";
+/// Set for an editor that came up again by itself and had the scan that comes with the program open.
+const SAMPLE_VARIABLE: &str = "NORMEND_RESTARTED_SAMPLE";
+/// [`RESTARTED_VARIABLE`] where edits are lost.
+const LOST: &str = "lost";
 /// Asks for a loss of the graphics device, see [`is_loss_asked_for`].
 const LOSE_VARIABLE: &str = "NORMEND_LOSE_DEVICE";
 /// Asks for a panic, see [`is_panic_asked_for`] and [`is_work_panic_asked_for`].
@@ -89,7 +94,7 @@ struct Run {
     adapter: String,
     messages: VecDeque<String>,
     /// The scan that is open.
-    scan: Option<PathBuf>,
+    scan: Option<ScanOrigin>,
     /// When the window came up; before that a panic is a missing library, which is said in words.
     started: Option<Instant>,
     /// The graphics device is gone, and why.
@@ -130,8 +135,8 @@ pub(crate) fn start(adapter: &str) {
 }
 
 /// Keeps which scan is open, for [`restart`].
-pub(crate) fn set_scan(scan: Option<&Path>) {
-    run().scan = scan.map(Path::to_path_buf);
+pub(crate) fn set_scan(scan: ScanOrigin) {
+    run().scan = Some(scan);
 }
 
 /// Keeps what becomes of the edits when the editor stops now.
@@ -193,25 +198,38 @@ pub fn was_restarted() -> bool {
 /// # Errors
 /// In words: the program cannot be started, or it was lost at once after it had come up again.
 pub(crate) fn restart() -> Result<(), String> {
-    let (scan, started) = {
-        let run = run();
-        (run.scan.clone(), run.started)
-    };
-    let is_too_soon = started.is_none_or(|started| started.elapsed() < SHORTEST_RUN);
+    let run = run();
+    let is_too_soon = run.started.is_none_or(|started| started.elapsed() < SHORTEST_RUN);
     if was_restarted() && is_too_soon {
         return Err("it was lost again at once, so the graphics driver needs a look".to_owned());
     }
-    restart_into(scan.as_deref()).map_err(|error| format!("it cannot be started again: {error}"))
+    let started = std::env::current_exe().and_then(|program| successor(&program, &run).spawn());
+    started
+        .map(drop)
+        .map_err(|error| format!("it cannot be started again: {error}"))
 }
 
-/// Starts the same program on `scan`, as one that restores without asking.
-fn restart_into(scan: Option<&Path>) -> io::Result<()> {
-    let mut command = Command::new(std::env::current_exe()?);
-    if let Some(scan) = scan {
-        command.arg("--").arg(scan);
+/// What starts `program` as the one that goes on with the scan of `run` and restores without asking.
+fn successor(program: &Path, run: &Run) -> Command {
+    let mut command = Command::new(program);
+    command.env_remove(SAMPLE_VARIABLE);
+    match &run.scan {
+        Some(ScanOrigin::File(path)) => drop(command.arg("--").arg(path)),
+        Some(ScanOrigin::Sample) => drop(command.env(SAMPLE_VARIABLE, "1")),
+        None => {}
     }
-    command.env(RESTARTED_VARIABLE, "1").spawn()?;
-    Ok(())
+    command.env(RESTARTED_VARIABLE, if run.edits == Edits::Lost { LOST } else { "1" });
+    command
+}
+
+/// Whether this editor came up again by itself and edits of the one before it are lost.
+pub(crate) fn has_lost_edits() -> bool {
+    std::env::var_os(RESTARTED_VARIABLE).is_some_and(|value| value == LOST)
+}
+
+/// Whether this editor came up again by itself and shall open the scan that comes with the program.
+pub(crate) fn reopens_sample() -> bool {
+    was_restarted() && std::env::var_os(SAMPLE_VARIABLE).is_some()
 }
 
 /// Writes a report of a panic while the window is up. `None` when there is nothing to write it for, or nowhere.
@@ -367,6 +385,32 @@ mod tests {
         }
         fs::write(folder.path().join("crash-2026-11-22-140359.txt"), "of an older editor").unwrap();
         assert_eq!(news_in(folder.path(), "").unwrap().edits, None);
+    }
+
+    #[test]
+    fn the_editor_that_comes_up_again_gets_the_scan_and_hears_of_what_is_lost() {
+        let check = |scan: Option<ScanOrigin>, edits: Edits| {
+            let command = successor(Path::new("normend"), &Run { scan, edits, ..a_run() });
+            let arguments: Vec<String> = (command.get_args())
+                .map(|argument| argument.to_string_lossy().into_owned())
+                .collect();
+            let value = |name: &str| {
+                let set = command.get_envs().find(|(key, _)| *key == name);
+                set.and_then(|(_, value)| Some(value?.to_string_lossy().into_owned()))
+            };
+            (arguments.join(" "), value(RESTARTED_VARIABLE), value(SAMPLE_VARIABLE))
+        };
+        let words = |words: &str| Some(words.to_owned());
+        let file = ScanOrigin::File("-a.ply".into());
+        assert_eq!(
+            check(Some(file), Edits::Kept),
+            ("-- -a.ply".to_owned(), words("1"), None)
+        );
+        assert_eq!(
+            check(Some(ScanOrigin::Sample), Edits::Lost),
+            (String::new(), words(LOST), words("1"))
+        );
+        assert_eq!(check(None, Edits::None), (String::new(), words("1"), None));
     }
 
     #[test]

@@ -78,6 +78,10 @@ struct Out {
     lines: Option<LineWriter>,
     /// Bytes of whole lines in the file.
     n_bytes: u64,
+    /// How many of them were there when they were last synced.
+    n_synced: u64,
+    /// The last sync failed, so nothing after those may be on the disk.
+    is_unsynced: bool,
     /// Lines that are not in the file yet.
     pending: Vec<u8>,
     failed: Option<Instant>,
@@ -95,6 +99,8 @@ impl Journal {
             file: None,
             lines: None,
             n_bytes: 0,
+            n_synced: 0,
+            is_unsynced: false,
             pending: Vec::new(),
             failed: None,
             news: None,
@@ -102,7 +108,8 @@ impl Journal {
         })
     }
 
-    /// Goes on with a journal that was left behind, after its edits were restored. What of it is damaged is copied beside it.
+    /// Goes on with a journal that was left behind, after its edits were restored. What of it is damaged is written over: see
+    /// [`Offer::keep_damaged`].
     pub fn resume(offer: Offer) -> Self {
         let Offer {
             reading,
@@ -110,10 +117,6 @@ impl Journal {
             mut file,
             ..
         } = offer;
-        if let recipe::End::Damaged(_) = reading.end {
-            // Whoever wants to look what it was; without room for it that is lost.
-            let _ = fs::copy(&path, path.with_extension("damaged"));
-        }
         // A tail that stays is overwritten by the next lines.
         let _ = file.set_len(reading.n_bytes);
         let mut last = [0];
@@ -132,6 +135,8 @@ impl Journal {
             file: Some((file, path)),
             lines: Some(reading.writer),
             n_bytes: reading.n_bytes,
+            n_synced: reading.n_bytes,
+            is_unsynced: false,
             pending,
             failed: None,
             news: None,
@@ -198,6 +203,11 @@ impl Journal {
         let mut out = lock(&self.out);
         if out.failed.is_some_and(|failed| failed.elapsed() >= RETRY_DELAY) {
             out.flush();
+            if let (true, Some(sync)) = (out.is_unsynced, &self.sync) {
+                out.failed = Some(Instant::now());
+                // Without its thread nothing was synced before either.
+                let _ = sync.send(());
+            }
         }
         out.news.take()
     }
@@ -268,9 +278,7 @@ impl Out {
             Ok(()) => {
                 self.n_bytes += self.pending.len() as u64;
                 self.pending = Vec::new();
-                if self.failed.take().is_some() {
-                    self.news = Some(News::Works);
-                }
+                self.succeed();
             }
             Err(error) => self.fail(&error),
         }
@@ -287,6 +295,24 @@ impl Out {
                 self.file = Some(create(&self.folder, &stem(&self.head.scan), &self.pending)?);
                 Ok(())
             }
+        }
+    }
+
+    /// Writes once more what may not be on the disk: a system that fails to sync forgets that it has to.
+    fn write_again(&mut self) -> io::Result<()> {
+        let Some((file, _)) = &mut self.file else { return Ok(()) };
+        let mut bytes = vec![0; (self.n_bytes - self.n_synced) as usize];
+        file.seek(SeekFrom::Start(self.n_synced))?;
+        file.read_exact(&mut bytes)?;
+        file.seek(SeekFrom::Start(self.n_synced))?;
+        file.write_all(&bytes)
+    }
+
+    /// Something is written or synced that was not before.
+    fn succeed(&mut self) {
+        let is_whole = self.pending.is_empty() && !self.is_unsynced;
+        if is_whole && self.failed.take().is_some() {
+            self.news = Some(News::Works);
         }
     }
 
@@ -367,7 +393,7 @@ fn keep_synced(out: &Mutex<Out>, asked: &mpsc::Receiver<()>) {
                 Err(RecvTimeoutError::Disconnected) => break true,
             }
         };
-        sync(out);
+        sync(out, File::sync_data);
         if !is_last && let Err(error) = shorten(out) {
             // The long one is as good.
             tracing::warn!("the journal was not shortened: {error}");
@@ -375,14 +401,27 @@ fn keep_synced(out: &Mutex<Out>, asked: &mpsc::Receiver<()>) {
     }
 }
 
-fn sync(out: &Mutex<Out>) {
-    // Not while others wait to write: a sync may take long.
-    let file = (lock(out).file.as_ref()).map(|(file, _)| file.try_clone());
-    if let Some(Err(error)) = file.map(|file| file?.sync_data()) {
+/// Syncs what is written, by `sync_data`.
+fn sync(out: &Mutex<Out>, sync_data: impl Fn(&File) -> io::Result<()>) {
+    let (file, n_bytes) = {
         let mut out = lock(out);
-        out.fail(&error);
-        // Nothing is pending, so nothing will be tried again by itself; the next edit does.
-        tracing::warn!("the journal was not synced: {error}");
+        let again = if out.is_unsynced { out.write_again() } else { Ok(()) };
+        let Some((file, _)) = &out.file else { return };
+        (again.and_then(|()| file.try_clone()), out.n_bytes)
+    };
+    // Not while others wait to write: a sync may take long.
+    let synced = file.and_then(|file| sync_data(&file));
+    let mut out = lock(out);
+    out.is_unsynced = synced.is_err();
+    match synced {
+        Ok(()) => {
+            out.n_synced = n_bytes;
+            out.succeed();
+        }
+        Err(error) => {
+            out.fail(&error);
+            tracing::warn!("the journal was not synced: {error}");
+        }
     }
 }
 
@@ -415,7 +454,9 @@ fn shorten(out: &Mutex<Out>) -> io::Result<()> {
         let file = temporary.persist(&path).map_err(|error| error.error)?;
         out.file = Some((file, path));
         out.lines = Some(writer);
-        out.n_bytes = bytes.len() as u64;
+        (out.n_bytes, out.n_synced) = (bytes.len() as u64, bytes.len() as u64);
+        out.is_unsynced = false;
+        out.succeed();
     }
     // Else there was an edit meanwhile; the present file has it.
     out.shorten_above = LEAST_TO_SHORTEN.max(2 * out.n_bytes);

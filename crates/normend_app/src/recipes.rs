@@ -11,7 +11,7 @@ use egui::Ui;
 use normend_io::recipe::{self, End, Recipe};
 
 use crate::app::App;
-use crate::command::Action;
+use crate::command::{Action, Command};
 use crate::crash::{self, Edits};
 use crate::job::{Job, JobError};
 use crate::journal::found::{self, Findings, Offer};
@@ -33,8 +33,10 @@ pub(crate) struct JournalFolder {
     pub(crate) patience: Duration,
 }
 
-/// A recipe that is being read or written.
+/// Recipes and journals that are being read or written; one at a time.
 pub(crate) enum RecipeJob {
+    /// The journals of a scan that is opened in place of one with the same content, which held its own until then.
+    Find(Job<Findings>),
     Open {
         job: Job<Recipe>,
         path: PathBuf,
@@ -44,14 +46,16 @@ pub(crate) enum RecipeJob {
         path: PathBuf,
         /// The journal that it is written from, in place of the present state.
         offer: Option<Box<Offer>>,
+        /// The user closed the editor meanwhile.
+        closes: bool,
     },
 }
 
 impl App {
     /// Opens a scan as the editor starts. Where `restores`, the newest journal of it is restored without asking.
-    pub fn open_at_start(&mut self, scan: PathBuf, restores: bool) {
+    pub fn open_at_start(&mut self, scan: ScanOrigin, restores: bool) {
         self.restores_unasked = restores;
-        self.open(ScanOrigin::File(scan));
+        self.open(scan);
     }
 
     /// Where the next scan's journals are.
@@ -66,13 +70,16 @@ impl App {
         })
     }
 
-    /// Begins to keep a journal of the scan that was just opened, and offers those that were found.
-    pub(crate) fn take_findings(&mut self, findings: Findings) {
-        let folder = self.settings.journals_folder();
-        let Some(session) = &mut self.session else { return };
-        if let Some(folder) = folder {
+    /// Begins to keep a journal of the scan that was just opened.
+    pub(crate) fn begin_journal(&mut self) {
+        if let (Some(session), Some(folder)) = (&mut self.session, self.settings.journals_folder()) {
             session.keep_journal(&folder);
         }
+    }
+
+    /// Offers the journals of the open scan that were found.
+    pub(crate) fn take_findings(&mut self, findings: Findings) {
+        let Some(session) = &mut self.session else { return };
         for problem in findings.problems {
             self.messages.error(problem);
         }
@@ -172,7 +179,13 @@ impl App {
             return;
         };
         let n_edits = theme::counted(offer.n_edits() as u64, "edit", "edits");
-        let damage = offer.damage();
+        let damage = offer.damage().map(|damage| {
+            let copy = match offer.keep_damaged() {
+                Ok(copy) => format!("The damaged file is kept as {}", copy.display()),
+                Err(error) => format!("The damaged file could not be kept beside it ({error})"),
+            };
+            format!("The journal was damaged, and what came after that is not restored: {damage}. {copy}.")
+        });
         match session.restore(offer) {
             Ok(()) => self.messages.info(format!("Restored {n_edits}.")),
             Err(error) => self.messages.error(format!(
@@ -180,9 +193,7 @@ impl App {
             )),
         }
         if let Some(damage) = damage {
-            self.messages.error(format!(
-                "The journal was damaged, and what came after that is not restored: {damage}. The damaged file is kept beside it."
-            ));
+            self.messages.error(damage);
         }
         if let (Some(scene), Some(session)) = (&mut self.scene, &mut self.session) {
             scene.show_state(session);
@@ -256,7 +267,27 @@ impl App {
                 .write(&target)
                 .map_err(|error| JobError::Failed(error.to_string()))
         });
-        self.recipe_job = Some(RecipeJob::Save { job, path, offer });
+        self.recipe_job = Some(RecipeJob::Save {
+            job,
+            path,
+            offer,
+            closes: false,
+        });
+    }
+
+    /// Whether a recipe is being written, which closing and opening wait for.
+    pub(crate) fn is_saving(&self) -> bool {
+        matches!(self.recipe_job, Some(RecipeJob::Save { .. }))
+    }
+
+    /// Where a recipe is being written, closes the editor only after that; says whether that is so.
+    pub(crate) fn closes_when_saved(&mut self) -> bool {
+        let Some(RecipeJob::Save { closes, .. }) = &mut self.recipe_job else {
+            return false;
+        };
+        *closes = true;
+        self.messages.note("The editor closes when the recipe is written.");
+        true
     }
 
     /// Starts to read a recipe for the open scan.
@@ -264,6 +295,10 @@ impl App {
         if self.session.is_none() {
             self.messages
                 .error("The recipe was not opened: open its scan first, then the recipe.");
+            return;
+        }
+        if let Err(reason) = self.availability(Command::OpenRecipe) {
+            self.messages.error(format!("The recipe was not opened: {reason}."));
             return;
         }
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
@@ -282,6 +317,15 @@ impl App {
     }
 
     fn take_recipe_job(&mut self) {
+        let was_saving = self.is_saving();
+        self.take_recipe_outcome();
+        if was_saving && !self.is_saving() {
+            // A scan that was read meanwhile is waiting.
+            self.ctx.request_repaint();
+        }
+    }
+
+    fn take_recipe_outcome(&mut self) {
         match self.recipe_job.take() {
             None => {}
             Some(RecipeJob::Open { job, path }) => match job.poll() {
@@ -295,8 +339,29 @@ impl App {
                 }
                 Some(Err(JobError::Cancelled)) => self.messages.note("The recipe was not opened: cancelled."),
             },
-            Some(RecipeJob::Save { job, path, offer }) => match job.poll() {
-                None => self.recipe_job = Some(RecipeJob::Save { job, path, offer }),
+            Some(RecipeJob::Find(job)) => match job.poll() {
+                None => self.recipe_job = Some(RecipeJob::Find(job)),
+                Some(Ok(findings)) => self.take_findings(findings),
+                Some(Err(JobError::Failed(reason))) => {
+                    self.messages
+                        .error(format!("Edits of before were not looked for. {reason}"));
+                }
+                Some(Err(JobError::Cancelled)) => {}
+            },
+            Some(RecipeJob::Save {
+                job,
+                path,
+                offer,
+                closes,
+            }) => match job.poll() {
+                None => {
+                    self.recipe_job = Some(RecipeJob::Save {
+                        job,
+                        path,
+                        offer,
+                        closes,
+                    });
+                }
                 Some(Ok(())) => {
                     self.settings.settings.remember_folder(Purpose::Recipe, &path);
                     self.messages.info(format!("Saved the recipe to {}.", path.display()));
@@ -304,8 +369,13 @@ impl App {
                     if let Some(Err(error)) = offer.map(|offer| offer.remove()) {
                         self.messages.error(format!("The journal was not removed: {error}."));
                     }
+                    if closes {
+                        self.ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+                    }
                 }
                 Some(Err(error)) => {
+                    // The user hears of it, and decides once more.
+                    self.quitting = false;
                     let reason = match error {
                         JobError::Failed(reason) => reason,
                         JobError::Cancelled => "cancelled".to_owned(),
@@ -364,11 +434,15 @@ impl App {
         }
     }
 
-    /// The journals of a scan that is opened in place of one with the same content, which held its own until now.
-    pub(crate) fn find_again(&self, session: &crate::session::Session) -> Findings {
-        let Some(folder) = self.settings.journals_folder() else {
-            return Findings::default();
+    /// Starts to look for the journals of the open scan, which is opened in place of one with the same content.
+    pub(crate) fn find_again(&mut self) {
+        let (Some(session), Some(folder)) = (&self.session, self.settings.journals_folder()) else {
+            return;
         };
-        found::find(&folder, &session.identity(), Duration::ZERO)
+        let identity = session.identity();
+        let job = Job::start(&self.ctx, "journals", "Looking for journals", move |_| {
+            Ok(found::find(&folder, &identity, Duration::ZERO))
+        });
+        self.recipe_job = Some(RecipeJob::Find(job));
     }
 }

@@ -11,6 +11,7 @@ use normend_render::SplatRenderer;
 use crate::app::App;
 use crate::crash::{self, DeviceLost, Ends};
 use crate::settings::{SettingsStore, WindowPlace};
+use crate::work::ScanOrigin;
 
 const MIN_SIZE: [f32; 2] = [900.0, 600.0];
 
@@ -46,7 +47,8 @@ pub fn run(scan: Option<PathBuf>, restores: bool) -> anyhow::Result<()> {
             options,
             Box::new(move |cc| {
                 let mut app = App::with_settings(cc, None, settings, problem);
-                if let Some(scan) = scan {
+                let sample = crash::reopens_sample().then_some(ScanOrigin::Sample);
+                if let Some(scan) = scan.map(ScanOrigin::File).or(sample) {
                     app.open_at_start(scan, restores || crash::was_restarted());
                 }
                 app.say_what_happened(news);

@@ -53,9 +53,13 @@ impl App {
                 news.path.display()
             ));
         }
-        if crash::was_restarted() {
-            self.messages
-                .note("The graphics device was lost, so Normend started again with your scan.");
+        let restarted = "The graphics device was lost, so Normend started again with your scan.";
+        if crash::has_lost_edits() {
+            self.messages.error(format!(
+                "{restarted} The edits since the last export are lost: their journal could not be written."
+            ));
+        } else if crash::was_restarted() {
+            self.messages.note(restarted);
         }
     }
 

@@ -75,6 +75,20 @@ impl Offer {
         }
     }
 
+    /// Copies the file to one beside it, whose path is returned; for when it is damaged, because whoever goes on with it writes over
+    /// what cannot be read.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn keep_damaged(&self) -> std::io::Result<PathBuf> {
+        let copy = self.path.with_extension("damaged");
+        // Not by its name: where locks bind, only who holds the file can read it.
+        let mut file = &self.file;
+        file.seek(SeekFrom::Start(0))?;
+        std::io::copy(&mut file, &mut File::create(&copy)?)?;
+        Ok(copy)
+    }
+
     /// The file.
     pub fn path(&self) -> &Path {
         &self.path

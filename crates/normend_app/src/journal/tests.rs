@@ -132,10 +132,16 @@ fn what_is_damaged_is_said_and_kept() {
     let offer = find_in(folder.path()).offers.pop().unwrap();
     assert_eq!(offer.n_edits(), 1);
     assert!(offer.damage().unwrap().starts_with("line 3: the line is damaged"));
+    let copy = offer.keep_damaged().unwrap();
     let mut journal = Journal::resume(offer);
     select(&mut journal, 9..10);
     assert_eq!(selected(&path), [0, 9]);
-    assert_eq!(fs::read(path.with_extension("damaged")).unwrap(), bytes);
+    assert_eq!(fs::read(&copy).unwrap(), bytes);
+    // Without a place for the copy that is said.
+    drop(journal);
+    fs::remove_file(&copy).unwrap();
+    fs::create_dir(&copy).unwrap();
+    assert!(find_in(folder.path()).offers[0].keep_damaged().is_err());
 }
 
 #[test]
@@ -228,6 +234,24 @@ fn a_full_disk_is_said_and_all_is_written_when_there_is_room() {
     journal.undo();
     assert_eq!(journal.news(), Some(News::Works));
     assert_eq!(selected(&path), [0, 1, 2]);
+}
+
+#[test]
+fn a_failed_sync_is_said_until_all_is_synced() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = Journal::new(folder.path(), head());
+    // From here on only the test syncs.
+    journal.finish();
+    select(&mut journal, 0..2);
+    sync(&journal.out, |_| Err(io::ErrorKind::StorageFull.into()));
+    assert!(matches!(journal.news(), Some(News::Failing(_))));
+    select(&mut journal, 2..3);
+    assert_eq!(journal.news(), None, "a line that is written is not synced");
+    assert!(!journal.is_kept());
+    sync(&journal.out, File::sync_data);
+    assert_eq!(journal.news(), Some(News::Works));
+    assert!(journal.is_kept());
+    assert_eq!(selected(&journal.path().unwrap()), [0, 1, 2]);
 }
 
 #[test]
