@@ -11,11 +11,14 @@ use egui::accesskit::Role;
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2};
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
-use normend_app::command::Command;
+use normend_app::command::{Action, Command};
 use normend_app::tools::Tool;
-use normend_core::{PointSet, confidence};
+use normend_core::{Parameters, PointSet, confidence};
 
-use driver::{Editor, N_POINTS, sphere_with_wrong_cap, sphere_without_normals, start, start_scaled};
+use driver::{
+    Editor, N_MANY_POINTS, N_POINTS, large_sphere_with_small_cap, sphere_with_wrong_cap, sphere_without_normals, start,
+    start_scaled,
+};
 
 const SHIFT_CTRL: Modifiers = Modifiers {
     shift: true,
@@ -468,16 +471,65 @@ fn the_picture_follows_what_is_selected_through_undo_and_redo() {
     editor.key(SHIFT_CTRL, Key::Z);
     editor.harness.run_steps(3);
     assert_eq!(editor.picture().rgba, all);
-    // Another propagation puts the points in another order; the same ones are selected.
-    let propagation = editor.app().document().unwrap().propagation().unwrap().clone();
-    editor.harness.state_mut().show_propagation(propagation);
-    editor.harness.run_steps(5);
-    assert_eq!(editor.picture().rgba, all);
+}
+
+#[test]
+fn another_propagation_selects_the_same_points_in_its_own_order() {
+    let Some(mut editor) = oriented(1.0) else { return };
+    let parameters = editor.app().document().unwrap().parameters();
+    let other = Parameters {
+        k_graph: *Parameters::K_GRAPH.start(),
+        ..parameters
+    };
+    let propagate = |editor: &mut Editor, parameters: Parameters| {
+        let app = editor.harness.state_mut();
+        app.act(Action::Propagate(parameters));
+        editor.wait("another propagation", |app| {
+            let in_force = app
+                .document()
+                .unwrap()
+                .propagation()
+                .map(|propagation| propagation.parameters);
+            !app.is_busy() && in_force == Some(parameters)
+        });
+        let tree = &editor.app().document().unwrap().propagation().unwrap().tree;
+        tree.order().to_vec()
+    };
+    let other_order = propagate(&mut editor, other);
+    let away = editor.app().view_rect().left_bottom() + Vec2::new(200.0, -8.0);
+    editor.hover(away);
+    editor.harness.run_steps(10);
+    let plain = editor.picture();
+    let (_, seen) = editor.app().seen_points().unwrap();
+
+    assert!(
+        propagate(&mut editor, parameters) != other_order,
+        "the order is the same"
+    );
+    editor.key(Modifiers::NONE, Key::R);
+    let center = middle(&editor);
+    rectangle(&mut editor, center, Vec2::new(70.0, 40.0), Modifiers::NONE);
+    let chosen = selected(&editor);
+    assert!(!chosen.is_empty() && chosen.len() < N_POINTS as u64 / 4);
+
+    assert!(propagate(&mut editor, other) == other_order, "the order is another one");
+    assert_eq!(selected(&editor), chosen);
+    editor.hover(away);
+    editor.harness.run_steps(10);
+    let shown = editor.picture();
+    let pixels = plain.rgba.chunks_exact(4).zip(shown.rgba.chunks_exact(4)).zip(&seen);
+    for (index, ((before, after), point)) in pixels.enumerate() {
+        let is_chosen = point.is_some_and(|point| chosen.contains(point));
+        assert_eq!(before != after, is_chosen, "pixel {index} of point {point:?}");
+    }
 }
 
 #[test]
 fn selecting_uploads_what_was_selected_alone() {
-    let Some(mut editor) = oriented(1.0) else { return };
+    let Some(mut editor) = start(large_sphere_with_small_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
     editor.key(Modifiers::NONE, Key::B);
     let center = middle(&editor);
     editor.harness.run_steps(3);
@@ -485,9 +537,9 @@ fn selecting_uploads_what_was_selected_alone() {
     stroke(&mut editor, &[center, center], Modifiers::NONE);
     let n_points = selected(&editor).len();
     let bytes = editor.app().bytes_uploaded() - before;
-    // A bit a point in words of 32, and the rest of a kilobyte between words that are near.
+    // A bit a point in words of 32, and what lies between words that are near; far less than a bit for each point of the scan.
     assert!(
-        bytes > 0 && bytes <= 4 * n_points.max(N_POINTS as u64 / 32 + 1),
+        bytes > 0 && bytes < N_MANY_POINTS as u64 / 8 / 4,
         "{bytes} for {n_points}"
     );
     // The same again changes nothing.

@@ -13,7 +13,10 @@ use egui_kittest::kittest::Queryable;
 use normend_app::command::Command;
 use normend_core::{EditKind, PointSet};
 
-use driver::{Editor, N_POINTS, n_different, sphere_with_wrong_cap, start};
+use driver::{
+    Editor, N_MANY_POINTS, N_POINTS, is_flipped_source, large_sphere_with_small_cap, n_different,
+    sphere_with_wrong_cap, start,
+};
 
 fn oriented() -> Option<Editor> {
     let mut editor = start(sphere_with_wrong_cap)?;
@@ -315,12 +318,74 @@ fn interactions_are_counted_and_undo_takes_none_back() {
 
 #[test]
 fn a_click_uploads_as_much_as_it_turns() {
-    let Some(mut editor) = oriented() else { return };
+    let Some(mut editor) = start(large_sphere_with_small_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
     let (place, n_points) = editor.hover_wrong_patch();
     let before = editor.app().bytes_uploaded();
     editor.click(place);
     editor.wait("a source", |app| app.document().unwrap().sources().len() == 1);
     let bytes = editor.app().bytes_uploaded() - before;
     // The turned words, and two spheres; the highlight of the next hover is as small.
-    assert!(bytes <= 4 * n_points + 1024, "{bytes} for {n_points} points");
+    let bound = 4 * n_points + 1024;
+    assert!(bytes > 0 && bytes <= bound, "{bytes} for {n_points} points");
+    // A bit for each point would be more.
+    assert!(
+        bound < N_MANY_POINTS as u64 / 8,
+        "{n_points} points are too many to tell"
+    );
+}
+
+/// Clicks twice where what is there is known, so that each click acts at once.
+fn double_click(editor: &mut Editor, place: Pos2) {
+    editor.hover(place);
+    editor.harness.run_steps(40);
+    editor.click(place);
+    editor.click(place);
+    editor.harness.run_steps(20);
+}
+
+#[test]
+fn a_double_click_takes_nothing_back_but_its_first_click() {
+    let Some(mut editor) = oriented() else { return };
+    let place = editor.mend();
+    let center = wrong_place(&editor);
+    select_around(&mut editor, center + Vec2::new(0.0, 60.0), Vec2::splat(15.0));
+    editor.key(Modifiers::NONE, Key::P);
+    editor.key(Modifiers::NONE, Key::M);
+    let state = |editor: &Editor| {
+        let document = editor.app().document().unwrap();
+        (document.n_done(), document.revision(), document.marks().n_pinned())
+    };
+    let before = state(&editor);
+    assert_eq!(last_kind(&editor), EditKind::Pin);
+
+    // The first click is refused: the point is pinned.
+    double_click(&mut editor, center + Vec2::new(0.0, 60.0));
+    assert!(editor.said("Nothing changed"), "the click was not refused");
+    assert_eq!(state(&editor), before);
+
+    // The first click is beside the scan.
+    let corner = editor.app().view_rect().left_bottom() + Vec2::new(30.0, -30.0);
+    double_click(&mut editor, corner);
+    assert_eq!(state(&editor), before);
+
+    // The first click selects a source, which is no edit.
+    let sphere = editor.picture().inside(is_flipped_source).unwrap();
+    let sphere = editor.place(sphere);
+    assert!(sphere.distance(place) < 200.0);
+    double_click(&mut editor, sphere);
+    assert_eq!(state(&editor), before);
+
+    // What a tool selects anew and finds selected already is no edit either.
+    editor.key(Modifiers::NONE, Key::C);
+    editor.click(center);
+    editor.wait("all points", |app| {
+        app.document().unwrap().selected().len() == N_POINTS as u64
+    });
+    let before = state(&editor);
+    editor.harness.run_steps(40);
+    double_click(&mut editor, center + Vec2::new(5.0, 0.0));
+    assert_eq!(state(&editor), before);
 }

@@ -341,12 +341,31 @@ pub const N_POINTS: usize = 4000;
 
 /// A sphere whose normals are right but for a cap that faces the corner view.
 pub fn sphere_with_wrong_cap(folder: &Path) -> Option<PathBuf> {
-    let shape = shapes::sphere(N_POINTS);
+    sphere_with_cap(folder, N_POINTS, 0.8)
+}
+
+/// So many points that a bit for each of them is far more than what a small edit uploads.
+pub const N_MANY_POINTS: usize = 200_000;
+
+/// As [`sphere_with_wrong_cap`], of [`N_MANY_POINTS`], half a hundredth of them in the cap.
+pub fn large_sphere_with_small_cap(folder: &Path) -> Option<PathBuf> {
+    sphere_with_cap(folder, N_MANY_POINTS, 0.99)
+}
+
+/// `cosine` is that of the angle from the middle of the cap to its border.
+fn sphere_with_cap(folder: &Path, n_points: usize, cosine: f32) -> Option<PathBuf> {
+    let shape = shapes::sphere(n_points);
     let toward_view = Vec3::new(1.0, -1.0, 1.0) / 3.0_f32.sqrt();
     let normals: Vec<Vec3> = shape
         .normals
         .iter()
-        .map(|&normal| if normal.dot(toward_view) > 0.8 { -normal } else { normal })
+        .map(|&normal| {
+            if normal.dot(toward_view) > cosine {
+                -normal
+            } else {
+                normal
+            }
+        })
         .collect();
     let path = folder.join("sphere.ply");
     normend_io::write_points(&path, Positions::Float(&shape.positions), Some(&normals), &Silent).unwrap();
