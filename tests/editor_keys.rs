@@ -52,6 +52,38 @@ fn about_is_open(editor: &Editor) -> bool {
 }
 
 #[test]
+fn a_held_modifier_is_part_of_the_recorded_key() {
+    let Some(mut editor) = start_with_keys() else { return };
+    search(&mut editor, "about");
+    editor.click_button("Add a key to About Normend");
+    let held = [
+        (Key::ControlLeft, Modifiers::COMMAND | Modifiers::CTRL),
+        (Key::ShiftLeft, Modifiers::COMMAND | Modifiers::CTRL | Modifiers::SHIFT),
+        (Key::AltRight, Modifiers::NONE),
+        (Key::SuperLeft, Modifiers::NONE),
+    ];
+    // As they arrive from a keyboard: each goes down by itself.
+    for (key, modifiers) in held {
+        editor.harness.event(egui::Event::Key {
+            key,
+            physical_key: None,
+            pressed: true,
+            repeat: false,
+            modifiers,
+        });
+        editor.harness.run_steps(1);
+        assert!(
+            editor.shows("Press the key for “About Normend”"),
+            "{key:?} alone was taken"
+        );
+        assert!(keys_of(&editor, Command::About).is_empty());
+    }
+    editor.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::K);
+    let expect = KeyboardShortcut::new(Modifiers::COMMAND | Modifiers::SHIFT, Key::K);
+    assert_eq!(keys_of(&editor, Command::About), [expect]);
+}
+
+#[test]
 fn a_recorded_key_gives_its_command_and_is_shown_and_kept() {
     let Some(mut editor) = start_with_keys() else { return };
     // A command without a key gets one; while it is recorded the key does nothing else.

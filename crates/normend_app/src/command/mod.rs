@@ -19,7 +19,7 @@ use crate::viewpoints::ViewpointAction;
 use crate::tools::point_tool::Means;
 use crate::viewport::Pixel;
 
-pub use keys::{Keymap, MOUSE, shortcut_text, take_shortcuts};
+pub use keys::{Keymap, MOUSE, is_modifier, shortcut_text, take_shortcuts};
 pub use table::Command;
 
 /// What a user asks for, with its data.

@@ -3,7 +3,7 @@
 use egui::{Align, Align2, Button, ComboBox, Event, Key, KeyboardShortcut, Layout, Modifiers, RichText, ScrollArea};
 use egui::{TextEdit, Ui, Vec2};
 
-use crate::command::{Command, Keymap, Menu, shortcut_text};
+use crate::command::{Command, Keymap, Menu, is_modifier, shortcut_text};
 use crate::settings::{PaletteChoice, Settings, ThemeChoice};
 use crate::theme::{self, SPACE_M, SPACE_S, SPACE_XS};
 
@@ -60,7 +60,8 @@ pub struct Preferences {
 }
 
 impl Preferences {
-    /// While a key is recorded, takes it and all others from the input; says whether it did.
+    /// While a key is recorded, takes it and all others from the input; says whether it did. Ctrl, Shift and the like are waited
+    /// through: they are part of the key that follows.
     pub fn take_key(&mut self, ctx: &egui::Context, keys: &mut Keymap) -> bool {
         let Some(recording) = self.recording else { return false };
         let pressed = ctx.input_mut(|input| {
@@ -71,7 +72,7 @@ impl Preferences {
                     repeat: false,
                     modifiers,
                     ..
-                } => Some(Ok(shortcut_of(*key, *modifiers))),
+                } if !is_modifier(*key) => Some(Ok(shortcut_of(*key, *modifiers))),
                 Event::Copy | Event::Cut | Event::Paste(_) => Some(Err(FOR_TEXT)),
                 _ => None,
             });

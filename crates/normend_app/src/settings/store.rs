@@ -311,12 +311,12 @@ mod tests {
 
     #[test]
     fn one_wrong_value_costs_only_itself() {
-        let content = "version = 2\ntheme = 3\npalette = \"paper\"\n[keys]\nUndo = [\"Ctrl+Nothing\"]\nRedo = [\"Ctrl+R\"]\n\
+        let content = "version = 2\ntheme = 3\npalette = \"paper\"\n[keys]\nUndo = [\"Ctrl+Nothing\"]\nFlip = [\"ShiftLeft\"]\nRedo = [\"Ctrl+R\"]\n\
                        [window]\nsize = \"large\"\nmaximized = true";
         let folder = written(content);
         let (store, problem) = SettingsStore::load_from(folder.path());
         let problem = problem.unwrap();
-        for name in ["“theme”", "“keys.Undo”", "“window.size”"] {
+        for name in ["“theme”", "“keys.Undo”", "“keys.Flip”", "“window.size”"] {
             assert!(problem.contains(name), "{name}: {problem}");
         }
         assert!(!problem.contains("palette") && !problem.contains("Redo"), "{problem}");
