@@ -199,6 +199,37 @@ fn what_i_see_faces_me_is_shown_before_it_is_done() {
 }
 
 #[test]
+fn what_is_seen_is_judged_from_where_it_was_seen() {
+    let Some(mut editor) = oriented() else { return };
+    let run = |editor: &mut Editor, command: Command, moves: bool| {
+        editor.harness.run_steps(10);
+        editor.harness.state_mut().act(command.into());
+        if moves {
+            // Before the picture has answered.
+            editor.harness.state_mut().act(Command::ViewBack.into());
+        }
+        editor.wait("an answer of the picture", |app| !app.is_selecting());
+        editor.harness.run_steps(2);
+    };
+    run(&mut editor, Command::SelectBacks, false);
+    let backs = selected(&editor);
+    assert!(!backs.is_empty());
+    editor.key(Modifiers::COMMAND, Key::Z);
+    let camera = *editor.app().camera();
+    run(&mut editor, Command::SelectBacks, true);
+    assert_ne!(*editor.app().camera(), camera, "the view did not move");
+    assert_eq!(selected(&editor), backs);
+
+    editor.harness.state_mut().act(Command::ViewCorner.into());
+    run(&mut editor, Command::WhatISeeFacesMe, false);
+    let n_proposed = editor.app().n_proposed();
+    assert!(n_proposed.is_some());
+    editor.key(Modifiers::NONE, Key::Escape);
+    run(&mut editor, Command::WhatISeeFacesMe, true);
+    assert_eq!(editor.app().n_proposed(), n_proposed);
+}
+
+#[test]
 fn signs_spread_from_the_selection_and_into_it() {
     let Some(mut editor) = oriented() else { return };
     let center = wrong_place(&editor);
@@ -362,7 +393,9 @@ fn a_double_click_takes_nothing_back_but_its_first_click() {
     assert_eq!(last_kind(&editor), EditKind::Pin);
 
     // The first click is refused: the point is pinned.
+    let pivot = editor.app().camera().pivot;
     double_click(&mut editor, center + Vec2::new(0.0, 60.0));
+    assert_ne!(editor.app().camera().pivot, pivot, "it was no double-click");
     assert!(editor.said("Nothing changed"), "the click was not refused");
     assert_eq!(state(&editor), before);
 
