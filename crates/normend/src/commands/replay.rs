@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, anyhow};
 use normend_app::journal::found;
 use normend_app::session::Session;
+use normend_core::confidence::confidence;
 use normend_core::evidence::Known;
 use normend_core::progress::Part;
 use normend_core::{EditError, Parameters, Progress, Propagation, SideRule, Silent};
@@ -150,6 +151,12 @@ fn replay(arguments: &ReplayArguments, bar: &Bar) -> anyhow::Result<Replayed> {
     let parameters = arguments.propagation.over(session.document.parameters());
     let propagation = propagation(&session, parameters, &Part::new(bar, 0.1..0.9))?;
     session.install(propagation);
+    let sureness = if arguments.confidence {
+        let found = session.document.propagation().and_then(confidence);
+        Some(found.context("--confidence is known for the automatic method only, and the recipe has another: say --preset auto, or leave it out")?)
+    } else {
+        None
+    };
     let normals = session.document.oriented_normals().ok_or(EditError::NotReady)?;
     let rule = session.rule().ok_or(EditError::NotReady)?;
     let orient = orient_started.elapsed().as_secs_f64();
@@ -161,7 +168,9 @@ fn replay(arguments: &ReplayArguments, bar: &Bar) -> anyhow::Result<Replayed> {
     };
     let writing = Part::new(bar, 0.9..1.0);
     writing.report(0.0)?;
-    session.scan.write(&normals, &arguments.output, &options, &writing)?;
+    session
+        .scan
+        .write_with_confidence(&normals, sureness.as_deref(), &arguments.output, &options, &writing)?;
 
     let document = &session.document;
     Ok(Replayed {
@@ -265,7 +274,7 @@ pub fn rehearse(arguments: &RehearseArguments) -> anyhow::Result<Outcome> {
         session.restore(offer)?;
     }
     let propagation = propagation(&session, session.document.parameters(), &Silent)?;
-    session.document.install(propagation);
+    session.install(propagation);
     let mut out = io::stdout().lock();
     writeln!(out, "{n_done}").and_then(|()| out.flush())?;
     for event in &recipe.events[n_done..] {
