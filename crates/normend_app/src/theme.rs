@@ -26,7 +26,7 @@ pub const LABEL_WIDTH: f32 = 104.0;
 pub const SCROLL_WIDTH: f32 = 6.0;
 /// Width of the second column in windows, and in a side panel of the usual width, in points.
 const VALUE_WIDTH: f32 = SIDE_PANEL_WIDTH - 2.0 * SPACE_M - SCROLL_WIDTH - LABEL_WIDTH - SPACE_S;
-/// Width of the number beside a slider, in points.
+/// Width of a number beside a slider and of every other number that fits, in points.
 const SLIDER_VALUE_WIDTH: f32 = 52.0;
 /// Height of rows that are only read, in points.
 pub const FACT_HEIGHT: f32 = 18.0;
@@ -121,7 +121,7 @@ pub fn apply(ctx: &egui::Context) {
         style.spacing.button_padding = Vec2::new(SPACE_M, SPACE_XS);
         style.spacing.window_margin = Margin::same(SPACE_L as i8);
         style.spacing.menu_margin = Margin::same(SPACE_XS as i8);
-        style.spacing.interact_size = Vec2::new(40.0, 26.0);
+        style.spacing.interact_size = Vec2::new(SLIDER_VALUE_WIDTH, 26.0);
         set_value_width(&mut style.spacing, VALUE_WIDTH);
         // A bar that shows that there is more, without the pointer over it.
         style.spacing.scroll = egui::style::ScrollStyle {
