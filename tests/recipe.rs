@@ -16,12 +16,19 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
+use normend_app::command::Action;
+use normend_app::App;
+use normend_app::coloring::Coloring;
+use normend_app::command::{Action, Command as Asked};
+use normend_app::journal::found;
+use normend_app::session::Session;
 use normend_core::document::FlipReason;
 use normend_core::sources::Origin;
-use normend_core::{Document, Edit, Parameters, PointSet, Preset, Propagation, Silent, Source};
+use normend_core::{Document, Edit, Parameters, PointSet, Preset, Propagation, Silent, Source, shapes};
+use normend_io::Positions;
 use normend_io::recipe::{self, Recipe};
 
-use driver::{Editor, sphere_with_wrong_cap, sphere_without_normals, start};
+use driver::{Editor, large_sphere_with_small_cap, sphere_with_wrong_cap, sphere_without_normals, start};
 
 fn scan_of(editor: &Editor) -> PathBuf {
     editor.folder.path().join("sphere.ply")
@@ -469,6 +476,72 @@ fn a_replay_gives_the_bytes_of_the_editors_export() {
 }
 
 #[test]
+fn confidence_is_exported_when_asked_and_known_and_replayed_the_same() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let folder = editor.folder.path().to_path_buf();
+    let is_disabled = |editor: &Editor| {
+        let found = editor.harness.get_by_role_and_label(Role::CheckBox, "With confidence");
+        found.accesskit_node().is_disabled()
+    };
+    // The normals that came with the file say nothing of how sure they are.
+    editor.key(Modifiers::COMMAND, Key::E);
+    assert!(is_disabled(&editor));
+    editor.key(Modifiers::NONE, Key::Escape);
+    let saved = folder.join("kept.normend");
+    save_recipe(&mut editor, &saved);
+    let output = normend(
+        &folder,
+        &["replay", "kept.normend", "sphere.ply", "-o", "none.ply", "--confidence"],
+    );
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("--start estimate --preset auto"));
+    assert!(!folder.join("none.ply").exists());
+
+    let parameters = Preset::Auto.parameters();
+    editor.harness.state_mut().act(Action::Propagate(parameters));
+    editor.wait("the automatic result", |app| {
+        !app.is_busy() && app.document().unwrap().parameters() == parameters
+    });
+    let flip = Edit::FlipPoints {
+        points: PointSet::from_iter(0..40),
+        reason: FlipReason::Asked,
+    };
+    editor.harness.state_mut().apply_edit(&flip);
+    editor.harness.run_steps(2);
+    editor.key(Modifiers::COMMAND, Key::E);
+    assert!(!is_disabled(&editor));
+    editor.harness.get_by_label("With confidence").click();
+    editor.harness.run_steps(2);
+    picture_of(&mut editor, "export_with_confidence.png");
+    let exported = folder.join("with_confidence.ply");
+    editor.type_export_path(&exported);
+    editor.click_button("Export");
+    editor.wait("an exported file", |app| !app.is_busy());
+    let bytes = fs::read(&exported).unwrap();
+    assert!(String::from_utf8_lossy(&bytes).contains("property float confidence\nproperty uchar oriented\n"));
+    assert_eq!(
+        normend_io::read(&exported, &Silent).unwrap().given_normals.unwrap().as_slice(),
+        editor.normals()
+    );
+
+    save_recipe(&mut editor, &folder.join("auto.normend"));
+    let output = normend(
+        &folder,
+        &["replay", "auto.normend", "sphere.ply", "-o", "replayed.ply", "--confidence"],
+    );
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert!(fs::read(folder.join("replayed.ply")).unwrap() == bytes);
+}
+
+#[test]
 fn a_replay_refuses_what_is_not_meant_and_writes_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
@@ -575,4 +648,183 @@ fn a_replay_refuses_what_is_not_meant_and_writes_nothing_else() {
         .unwrap();
     assert!(normals[7].z <= 0.0);
     assert_eq!(files().len(), before.len() + 2);
+}
+
+#[test]
+fn a_recipe_keeps_the_colors_and_the_reference_in_the_picture() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    let reference = editor.folder.path().join("reference.ply");
+    let shape = shapes::sphere(driver::N_POINTS);
+    normend_io::write_points(
+        &reference,
+        Positions::Float(&shape.positions),
+        Some(&shape.normals),
+        &Silent,
+    )
+    .unwrap();
+    mend_twice_and_undo(&mut editor);
+    let saved = editor.folder.path().join("mine.normend");
+    save_recipe(&mut editor, &saved);
+    editor.harness.state_mut().act(Action::OpenReference(reference));
+    editor.harness.state_mut().act(Action::Display(Coloring::Regions));
+    let settle = |editor: &mut Editor| {
+        editor.harness.hover_at(egui::Pos2::new(5.0, 300.0));
+        editor.wait("colors and counts", |app| {
+            app.is_painted() && app.comparing().judged().is_some() && !app.comparing().is_busy()
+        });
+        editor.harness.run_steps(5);
+    };
+    settle(&mut editor);
+    let mended = editor.picture().rgba;
+    editor.key(Modifiers::COMMAND, Key::Z);
+    settle(&mut editor);
+    let before = editor.picture().rgba;
+    assert!(before != mended, "the regions are others");
+    let n_interactions = editor.app().n_interactions();
+    editor.drop_file(&saved);
+    wait_for_words(&mut editor, "Applied mine.normend");
+    settle(&mut editor);
+    assert!(editor.picture().rgba == mended, "the picture is as it was");
+    assert_eq!(editor.app().n_interactions(), n_interactions + 1, "a recipe is one");
+}
+
+#[test]
+fn nothing_is_exported_until_it_is_oriented_as_the_history_says() {
+    let Some(mut editor) = start(large_sphere_with_small_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let first = editor.app().document().unwrap().parameters();
+    let second = Parameters {
+        k_graph: first.k_graph + 3,
+        ..first
+    };
+    editor.harness.state_mut().act(Action::Propagate(second));
+    editor.wait_until_oriented();
+    let is_in_force = |app: &App, parameters| app.document().unwrap().propagation().unwrap().parameters == parameters;
+    assert!(is_in_force(editor.app(), second));
+
+    // The job that follows an undo ends just when that is done again: it must not become a step.
+    editor.key(Modifiers::COMMAND, Key::Z);
+    editor.wait("the job", App::is_busy);
+    editor
+        .harness
+        .key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+    editor.harness.step();
+    std::thread::sleep(std::time::Duration::from_secs(3));
+    editor.wait_until_oriented();
+    let document = editor.app().document().unwrap();
+    assert_eq!((document.n_done(), document.steps().count()), (1, 1));
+    assert!(is_in_force(editor.app(), second));
+    assert_eq!(editor.app().availability(Asked::Export), Ok(()));
+
+    // It is cancelled: what is in force is not what is wanted.
+    editor.harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    editor.wait("the job", App::is_busy);
+    editor.harness.state_mut().act(Action::CancelJob);
+    editor.wait("the end of the job", |app| !app.is_busy());
+    editor.harness.run_steps(3);
+    assert!(!editor.app().is_busy(), "what was cancelled is not begun again");
+    assert!(is_in_force(editor.app(), second));
+    assert_eq!(editor.app().document().unwrap().parameters(), first);
+    let reason = editor.app().availability(Asked::Export).unwrap_err();
+    assert!(reason.contains("press Propagate, or undo"), "{reason}");
+    let target = editor.folder.path().join("out.ply");
+    editor.harness.state_mut().act(Action::ExportTo {
+        path: target.clone(),
+        overwrite_input: false,
+    });
+    editor.harness.run_steps(3);
+    assert!(editor.said("Nothing was exported: ") && !target.exists());
+
+    // Both ways out: do it again, or propagate.
+    editor.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+    assert_eq!(editor.app().availability(Asked::Export), Ok(()));
+    editor.key(Modifiers::COMMAND, Key::Z);
+    editor.wait_until_oriented();
+    assert!(is_in_force(editor.app(), first), "asked once more, it comes");
+    assert_eq!(editor.app().availability(Asked::Export), Ok(()));
+}
+
+#[test]
+fn journals_of_before_are_all_offered_again_but_never_mixed_with_new_edits() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    let scan = scan_of(&editor);
+    editor.wait_until_oriented();
+    editor.mend();
+    let mut editor = editor.crash_and_start(&scan);
+    editor.wait_until_oriented();
+    editor.click_button("Decide later");
+    editor.mend();
+    assert_eq!(editor.journals().len(), 2);
+    // Opened again, both are there.
+    editor.drop_file(&scan);
+    editor.harness.run_steps(2);
+    editor.click_button("Keep for next time");
+    wait_for_words(&mut editor, "Restore 1 edit?");
+    editor.wait_until_oriented();
+    assert!(
+        editor
+            .harness
+            .query_by_label_contains("There is 1 other journal")
+            .is_some()
+    );
+    // An edit that comes meanwhile, as from a script.
+    editor.harness.state_mut().act(Asked::SelectAll.into());
+    editor.wait("the edit", |app| app.document().unwrap().n_done() == 1);
+    editor.harness.run_steps(3);
+    assert!(!editor.shows("Restore 1 edit?"));
+    assert!(editor.said("open it again to restore those"));
+    assert_eq!(editor.app().document().unwrap().steps().count(), 1);
+    assert_eq!(editor.journals().len(), 3, "both stay");
+}
+
+#[test]
+fn what_is_accepted_after_an_export_is_kept_and_interactions_are_counted_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = sphere_with_wrong_cap(folder.path()).unwrap();
+    let journals = folder.path().join("journals");
+    let open = || {
+        let scan = normend_io::read(&path, &Silent).unwrap();
+        let mut session = Session::new(scan, "sphere.ply".to_owned());
+        let offer = found::find(&journals, &session.identity(), std::time::Duration::ZERO)
+            .offers
+            .pop();
+        session.keep_journal(&journals);
+        if let Some(offer) = offer {
+            session.restore(offer).unwrap();
+        }
+        let parameters = session.document.parameters();
+        let given = session.scan.given_normals.clone();
+        let given = given.as_ref().map(|normals| normals.as_slice());
+        let propagation = Propagation::new(&session.scan.cloud, given, parameters, &Silent).unwrap();
+        session.install(propagation);
+        session
+    };
+    let accept = |session: &mut Session, point| session.apply(Edit::Accept(PointSet::from_iter(0..=point))).unwrap();
+    let n_journals = || fs::read_dir(&journals).unwrap().count();
+    let mut session = open();
+    accept(&mut session, 0);
+    session.apply(Edit::Mend(5)).unwrap();
+    session.mark_saved(session.document.signs_revision());
+    accept(&mut session, 1);
+    session.finish();
+    assert_eq!(n_journals(), 1, "one more was accepted");
+
+    let mut session = open();
+    assert_eq!(session.document.state().accepted.len(), 2);
+    assert_eq!(session.n_interactions, 1, "the mend");
+    session.apply(Edit::Mend(9)).unwrap();
+    assert_eq!(session.n_interactions, 2);
+    let recipe = Recipe::of_document(session.identity(), &session.document);
+    session.undo();
+    session.take_recipe(&recipe).unwrap();
+    assert_eq!(session.n_interactions, 3);
+    session.mark_saved(session.document.signs_revision());
+    session.finish();
+    assert_eq!(n_journals(), 0, "all is exported");
 }
