@@ -731,13 +731,9 @@ fn nothing_is_exported_until_it_is_oriented_as_the_history_says() {
     assert_eq!(editor.app().document().unwrap().parameters(), first);
     let reason = editor.app().availability(Asked::Export).unwrap_err();
     assert!(reason.contains("press Propagate, or undo"), "{reason}");
-    let target = editor.folder.path().join("out.ply");
-    editor.harness.state_mut().act(Action::ExportTo {
-        path: target.clone(),
-        overwrite_input: false,
-    });
+    editor.harness.state_mut().act(Asked::Export.into());
     editor.harness.run_steps(3);
-    assert!(editor.said("Nothing was exported: ") && !target.exists());
+    assert!(editor.said(reason) && editor.export_path().is_none());
 
     // Both ways out: do it again, or propagate.
     editor.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
