@@ -264,3 +264,45 @@ fn tab_reaches_every_button_in_the_order_they_are_read() {
     let order = ["Export…", "3D view", "Width of the side panel", "Orient", "History"].map(place);
     assert!(order.is_sorted(), "{order:?}: {reached:?}");
 }
+
+#[test]
+fn keys_mend_where_the_user_points_or_at_the_crosshair() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let before = editor.bits();
+    // In the middle of the view nobody points at anything.
+    editor.hover(egui::pos2(5.0, 5.0));
+    for (modifiers, key) in [
+        (Modifiers::NONE, Key::Enter),
+        (Modifiers::SHIFT, Key::Enter),
+        (Modifiers::ALT, Key::Enter),
+        (Modifiers::COMMAND, Key::G),
+    ] {
+        editor.key(modifiers, key);
+        editor.harness.run_steps(20);
+    }
+    assert!(editor.said("Point at the scan first"));
+    let document = editor.app().document().unwrap();
+    assert_eq!((document.n_done(), editor.app().n_would_turn()), (0, None));
+
+    let n_tabs = (0..60).find(|_| {
+        editor.key(Modifiers::NONE, Key::Tab);
+        editor.is_focused(Role::Image, "3D view")
+    });
+    assert!(n_tabs.is_some(), "Tab never comes to the view");
+    editor.wait("a preview at the crosshair", |app| app.n_would_turn().is_some());
+    let n_points = editor.app().n_would_turn().unwrap();
+    let turns = format!(
+        "A click turns {}",
+        normend_app::theme::counted(n_points, "point", "points")
+    );
+    assert!(editor.shows(&turns), "{turns}");
+    editor.key(Modifiers::NONE, Key::Enter);
+    editor.wait("a mend", |app| app.document().unwrap().n_done() == 1);
+    let n_turned: u32 = std::iter::zip(&before, editor.bits())
+        .map(|(a, b)| (a ^ b).count_ones())
+        .sum();
+    assert_eq!(u64::from(n_turned), n_points);
+}

@@ -11,7 +11,7 @@ use crate::compare::Style;
 use crate::crash;
 use crate::dialogs::{DialogAnswer, DialogPurpose};
 use crate::job::JobError;
-use crate::panels::export::ExportWindow;
+use crate::panels::export::{ExportOrder, ExportWindow};
 use crate::panels::modal::Modal;
 use crate::panels::open_path::{OpenPathWindow, What};
 use crate::panels::palette::PaletteWindow;
@@ -97,15 +97,15 @@ impl App {
                     self.dialogs.pick_target(&self.ctx, std::path::Path::new(window.path()));
                 }
             }
-            Action::ExportTo { path, overwrite_input } => {
+            Action::ExportTo(mut order) => {
                 if let Err(reason) = self.availability(Command::Export) {
                     self.messages.error(format!("Nothing was exported: {reason}."));
                     return;
                 }
                 let Some(session) = &self.session else { return };
                 // A relative path means the folder that the editor was started in; the message names it in full.
-                let path = std::path::absolute(&path).unwrap_or(path);
-                self.work = Work::export(&self.ctx, session, &path, overwrite_input);
+                order.path = std::path::absolute(&order.path).unwrap_or(order.path);
+                self.work = Work::export(&self.ctx, session, order);
             }
         }
     }
@@ -130,6 +130,7 @@ impl App {
                 if let Some(session) = &self.session {
                     let suggested = session.suggested_export(self.settings.settings.folder(Purpose::Export));
                     let window = ExportWindow::new(&suggested, session.scan.path().cloned());
+                    let window = window.with_confidence(session.knows_confidence());
                     self.windows.modal = Some(Modal::Export(window));
                 }
             }
@@ -138,7 +139,7 @@ impl App {
             Command::Redo => self.step_history(Session::redo),
             Command::MendHere => match self.suspect_in_focus() {
                 Some(index) => self.review(SuspectAction::Flip(index)),
-                None => self.click_at(self.meant_pixel(), Means::Patch),
+                None => self.at_meant_pixel(|app, pixel| app.click_at(pixel, Means::Patch)),
             },
             Command::NextSuspect => self.review(SuspectAction::Next),
             Command::PreviousSuspect => self.review(SuspectAction::Previous),
@@ -151,12 +152,14 @@ impl App {
                     });
                 }
             }
-            Command::MendAlongTreeHere => self.click_at(self.meant_pixel(), Means::Tree),
+            Command::MendAlongTreeHere => self.at_meant_pixel(|app, pixel| app.click_at(pixel, Means::Tree)),
             Command::LargerPatch => self.point_tool.step(1),
             Command::SmallerPatch => self.point_tool.step(-1),
-            Command::TurnWholeHere => self.click_at(self.meant_pixel(), Means::Whole),
-            Command::SelectPatchHere => self.click_at(self.meant_pixel(), Means::SelectPatch),
-            Command::SelectComponentHere => self.click_at(self.meant_pixel(), Means::SelectComponent),
+            Command::TurnWholeHere => self.at_meant_pixel(|app, pixel| app.click_at(pixel, Means::Whole)),
+            Command::SelectPatchHere => self.at_meant_pixel(|app, pixel| app.click_at(pixel, Means::SelectPatch)),
+            Command::SelectComponentHere => {
+                self.at_meant_pixel(|app, pixel| app.click_at(pixel, Means::SelectComponent))
+            }
             Command::BrushTool
             | Command::LassoTool
             | Command::RectangleTool
@@ -183,7 +186,7 @@ impl App {
             | Command::Unpin
             | Command::PropagateFrom
             | Command::PropagateInside => self.run_for_points(command),
-            Command::SetPivot => self.pivot_at(self.meant_pixel()),
+            Command::SetPivot => self.at_meant_pixel(Self::pivot_at),
             Command::SelectAllSources => {
                 if let Some(session) = &mut self.session {
                     session.selected = session.document.sources().iter().map(|source| source.point).collect();
@@ -531,24 +534,24 @@ impl App {
                 None => self.work = Some(Work::Pictures { job, target }),
                 Some(outcome) => self.take_pictures(outcome, &target),
             },
-            Some(Work::Export { job, path, revision }) => match job.poll() {
+            Some(Work::Export { job, order, revision }) => match job.poll() {
                 None => {
-                    self.work = Some(Work::Export { job, path, revision });
+                    self.work = Some(Work::Export { job, order, revision });
                 }
                 Some(Ok(())) => {
-                    self.settings.settings.remember_folder(Purpose::Export, &path);
+                    self.settings.settings.remember_folder(Purpose::Export, &order.path);
                     if let Some(session) = &mut self.session {
                         session.mark_saved(revision);
                         let n_points = theme::counted(session.scan.cloud.n_points() as u64, "point", "points");
                         self.messages
-                            .info(format!("Exported {n_points} to {}.", path.display()));
+                            .info(format!("Exported {n_points} to {}.", order.path.display()));
                     }
                     if let Some(leaving) = self.after_export.take() {
                         self.leave(leaving);
                     }
                 }
                 Some(Err(JobError::Failed(reason))) if self.windows.modal.is_none() && self.session.is_some() => {
-                    self.export_again(&path, &reason);
+                    self.export_again(&order, &reason);
                 }
                 Some(Err(error)) => {
                     self.after_export = None;
@@ -559,12 +562,13 @@ impl App {
     }
 
     /// Asks for the target once more after an export failed, with the same path and the reason.
-    fn export_again(&mut self, path: &std::path::Path, reason: &str) {
-        let name = ScanOrigin::File(path.to_path_buf()).name();
+    fn export_again(&mut self, order: &ExportOrder, reason: &str) {
+        let name = ScanOrigin::File(order.path.clone()).name();
         let problem = format!("{} {} was not written.", sentence(reason), theme::elided(&name, 48));
         self.messages.log_error(problem.clone());
-        let input = self.session.as_ref().and_then(|session| session.scan.path().cloned());
-        let window = ExportWindow::after_failure(path, input, problem);
+        let Some(session) = &self.session else { return };
+        let window = ExportWindow::after_failure(order, session.scan.path().cloned(), problem)
+            .with_confidence(session.knows_confidence());
         self.windows.modal = Some(Modal::Export(window));
     }
 

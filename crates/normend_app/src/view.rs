@@ -13,6 +13,8 @@ use crate::tools::point_tool::Means;
 use crate::tools::{Combine, Tool, ToolEvent};
 use crate::viewport::{Pixel, PointerOnView};
 
+const POINT_FIRST: &str = "Point at the scan first, or give the view the keyboard with Tab.";
+
 impl App {
     pub(crate) fn view(&mut self, ui: &mut Ui, draw_settings: &mut DrawSettings) -> Option<Action> {
         let Some(scene) = &mut self.scene else {
@@ -95,7 +97,11 @@ impl App {
                 ui.set_cursor_icon(CursorIcon::Crosshair);
             }
         }
-        if let (Some(position), Some((sign, text))) = (pointer.position, self.badge(pointer)) {
+        if let Some(place) = pointer.crosshair {
+            self.viewport.crosshair(ui, place);
+        }
+        let place = pointer.position.or(pointer.crosshair);
+        if let (Some(position), Some((sign, text))) = (place, self.badge(pointer)) {
             self.viewport.badge(ui, position, sign, &text);
         }
     }
@@ -197,9 +203,13 @@ impl App {
         self.clicked_revision = after.filter(|_| after != before);
     }
 
-    /// The pixel that keyboard commands mean: under the pointer, else the middle of the view.
-    pub(crate) fn meant_pixel(&self) -> Pixel {
-        self.hovered.unwrap_or_else(|| self.viewport.center())
+    /// Does what a command says at the pixel that it means, under the pointer or at the crosshair; says how to point where there
+    /// is none.
+    pub(crate) fn at_meant_pixel(&mut self, act: impl FnOnce(&mut Self, Pixel)) {
+        match self.hovered {
+            Some(pixel) => act(self, pixel),
+            None => self.messages.note(POINT_FIRST),
+        }
     }
 
     /// A click at a pixel, for what `means` says.

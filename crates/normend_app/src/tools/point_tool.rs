@@ -255,6 +255,10 @@ impl PointTool {
                 }
             }
         }
+        if pointer.hovered.is_none() {
+            // When it points again, it is at something else.
+            self.quiet = None;
+        }
         match pointer.hovered {
             Some(pixel) => {
                 if self.quiet.is_some_and(|quiet| quiet != pixel) {

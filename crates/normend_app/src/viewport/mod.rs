@@ -94,10 +94,12 @@ pub struct Viewport {
 /// What the pointer did in the view this frame.
 #[derive(Clone, Debug, Default)]
 pub struct PointerOnView {
-    /// The pixel under the resting pointer; `None` outside, while a button moves the camera, or while the camera moves.
+    /// The pixel under the resting pointer, or at the crosshair; `None` outside, while a button moves the camera, or while the camera moves.
     pub hovered: Option<Pixel>,
     /// Where the pointer is, in points.
     pub position: Option<Pos2>,
+    /// Where keys point, in points: the middle, while the view has the keyboard and the pointer is elsewhere.
+    pub crosshair: Option<Pos2>,
     /// A click with the main button.
     pub clicked: Option<Pixel>,
     /// The modifier keys that are held.
@@ -319,11 +321,6 @@ impl Viewport {
         self.id
     }
 
-    /// The pixel in the middle of the view.
-    pub fn center(&self) -> Pixel {
-        [self.size[0] / 2, self.size[1] / 2]
-    }
-
     /// The size of the view in physical pixels.
     pub fn size_in_pixels(&self) -> glam::Vec2 {
         glam::Vec2::new(self.size[0] as f32, self.size[1] as f32)
@@ -423,6 +420,7 @@ impl Viewport {
         self.notices(ui);
 
         let position = response.hover_pos();
+        let crosshair = (position.is_none() && response.has_focus()).then(|| self.rect.center());
         let resting = !moved && (self.hold.is_some() || !response.dragged()) && self.pace.is_full();
         let clicked_at = response
             .interact_pointer_pos()
@@ -432,9 +430,11 @@ impl Viewport {
         let pivot = double_clicked || response.clicked_by(PointerButton::Middle);
         PointerOnView {
             hovered: position
+                .or(crosshair)
                 .filter(|_| resting)
                 .and_then(|position| self.hold.map_or_else(|| self.pixel(position), |hold| Some(hold.pixel))),
             position,
+            crosshair,
             clicked: clicked_at
                 .filter(|_| clicks && response.clicked_by(PointerButton::Primary) && !double_clicked)
                 .or(chosen),

@@ -75,6 +75,17 @@ impl Viewport {
         rect.top() - SPACE_XS
     }
 
+    /// The cross that shows where keys point, `place` in its middle.
+    pub fn crosshair(&self, ui: &Ui, place: Pos2) {
+        let painter = ui.painter_at(self.rect);
+        for (width, color) in [(3.0, HALO), (1.5, LINE)] {
+            for arm in [Vec2::X, -Vec2::X, Vec2::Y, -Vec2::Y] {
+                // Open in the middle, so that what is meant is seen.
+                painter.line_segment([place + 4.0 * arm, place + 14.0 * arm], Stroke::new(width, color));
+            }
+        }
+    }
+
     /// A few words beside the pointer, after a sign if there is one.
     pub fn badge(&self, ui: &Ui, pointer: Pos2, sign: &str, text: &str) {
         let painter = ui.painter_at(self.rect);
