@@ -16,7 +16,6 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
-use normend_app::command::Action;
 use normend_app::App;
 use normend_app::coloring::Coloring;
 use normend_app::command::{Action, Command as Asked};
