@@ -15,7 +15,7 @@ use egui::{Key, Modifiers, Pos2, Vec2};
 use egui_kittest::kittest::Queryable;
 use glam::Vec3;
 use normend_app::coloring::{self, Coloring};
-use normend_app::command::Action;
+use normend_app::command::{Action, Command};
 use normend_app::panels::side::SideTab;
 use normend_core::{Preset, shapes};
 
@@ -348,4 +348,77 @@ fn a_section_leaves_a_slice() {
     assert!(turned.direction.dot(Vec3::Z) > 0.999, "{turned:?}");
     editor.key(Modifiers::SHIFT, Key::S);
     assert_eq!(editor.app().clip().section, None);
+}
+
+/// The brightness of all pixels.
+fn brightness(editor: &Editor) -> u64 {
+    editor.picture().rgba.iter().map(|&channel| u64::from(channel)).sum()
+}
+
+#[test]
+fn the_slider_of_edge_shading_darkens_edges() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    let set = |editor: &mut Editor, key: Key| {
+        let slider = editor.harness.get_by_role_and_label(Role::Slider, "Edge shading");
+        slider.focus();
+        editor.harness.run_steps(3);
+        // To the end.
+        for _ in 0..150 {
+            editor.harness.key_press(key);
+            editor.harness.step();
+        }
+        editor.harness.run_steps(10);
+        brightness(editor)
+    };
+    let usual = brightness(&editor);
+    let without = set(&mut editor, Key::ArrowLeft);
+    let strong = set(&mut editor, Key::ArrowRight);
+    assert!(strong < usual && usual < without, "{strong}, {usual}, {without}");
+}
+
+#[test]
+fn sliders_end_where_lists_end() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.harness.state_mut().act(Command::ToggleHair.into());
+    editor.harness.run_steps(3);
+    let right = |role, label| editor.harness.get_by_role_and_label(role, label).rect().right();
+    let list = right(Role::ComboBox, "Theme");
+    for label in ["Edge shading", "Splat size", "Length", "One in"] {
+        let number = right(Role::SpinButton, label);
+        assert!(
+            (number - list).abs() <= 1.0,
+            "{label} ends at {number}, lists at {list}"
+        );
+    }
+}
+
+#[test]
+fn a_broken_settings_file_is_set_aside_and_said() {
+    let broken = "version = 99";
+    let scan = |folder: &Path| {
+        let settings = folder.join("settings");
+        std::fs::create_dir_all(&settings).unwrap();
+        std::fs::write(settings.join("settings.toml"), broken).unwrap();
+        sphere_with_wrong_cap(folder)
+    };
+    let Some(mut editor) = start_prepared(1.0, |_| {}, scan) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    assert!(editor.said("settings.toml.broken"));
+    assert!(editor.shows("settings.toml.broken"), "nothing on the screen says so");
+    let settings = editor.folder.path().join("settings");
+    let kept = std::fs::read_to_string(settings.join("settings.toml.broken")).unwrap();
+    assert_eq!(kept, broken);
+    // What is set from now on is saved.
+    editor.harness.state_mut().act(Command::ToggleHair.into());
+    for _ in 0..600 {
+        editor.harness.step();
+    }
+    let saved = std::fs::read_to_string(settings.join("settings.toml")).unwrap();
+    assert!(saved.contains("hair = true"), "{saved}");
 }
