@@ -154,6 +154,12 @@ impl App {
         match restore::ui(ui, &session.name, session.scan.cloud.n_points(), offer, n_more) {
             restore::Decision::Wait => self.windows.modal = Some(Modal::Restore),
             restore::Decision::Later => self.decide_later(),
+            restore::Decision::Other => {
+                if let Some(session) = &mut self.session {
+                    session.offers.rotate_left(1);
+                }
+                self.windows.modal = Some(Modal::Restore);
+            }
             restore::Decision::Restore => {
                 self.restore_first();
                 self.decide_later();
@@ -242,7 +248,7 @@ impl App {
                 self.dialogs.pick_recipe_target(&self.ctx, Path::new(window.path()));
                 self.windows.modal = Some(Modal::SaveRecipe { window, of_offer });
             }
-            export::Decision::Export { path, .. } => self.save_recipe(&path, of_offer),
+            export::Decision::Export(order) => self.save_recipe(&order.path, of_offer),
         }
     }
 

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use normend_core::document::Step;
 use normend_core::{
     Change, Document, Edit, EditError, EditKind, Parameters, PointSet, Propagation, SpanningTree, Start, StateChange,
+    confidence,
 };
 use normend_io::Scan;
 use normend_io::recipe::{Event, Head, Recipe, RecordedStep, ScanIdentity};
@@ -136,6 +137,11 @@ impl Session {
     pub fn has_unsaved_mends(&self) -> bool {
         let mends = |step: &Step| step.change().is_of_signs() && step.kind() != EditKind::SetParameters;
         self.is_unsaved() && self.document.steps().take(self.document.n_done()).any(mends)
+    }
+
+    /// Whether the propagation in force tells how sure it is of each point.
+    pub fn knows_confidence(&self) -> bool {
+        self.document.propagation().is_some_and(confidence::is_known)
     }
 
     /// Whether the edits are in a journal, so that a crash does not lose them.

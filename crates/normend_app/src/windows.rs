@@ -137,9 +137,7 @@ impl App {
                     self.windows.modal = Some(Modal::Export(window));
                     self.act(Action::BrowseExport);
                 }
-                export::Decision::Export { path, overwrite_input } => {
-                    self.act(Action::ExportTo { path, overwrite_input });
-                }
+                export::Decision::Export(order) => self.act(Action::ExportTo(order)),
             },
             Some(Modal::Unsaved(leaving)) => {
                 let session = self.session.as_ref();

@@ -1,15 +1,16 @@
 //! The work that runs beside the window: opening, propagating, exporting; one at a time.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use normend_core::evidence::Known;
-use normend_core::{Document, Parameters, PointCloud, Propagation};
+use normend_core::{Document, Parameters, PointCloud, Propagation, confidence};
 use normend_io::{ReadError, Scan, WriteError, WriteOptions};
 use normend_render::{CloudUploader, UploadedCloud};
 
 use crate::job::{Job, JobError, JobStatus};
 use crate::journal::{self, found::Findings};
+use crate::panels::export::{ExportOrder, NO_CONFIDENCE};
 use crate::picture_job::{Made, PictureTarget};
 use crate::recipes::JournalFolder;
 use crate::scene_sync::{upload_oriented, upload_points};
@@ -112,8 +113,8 @@ pub enum Work {
     Export {
         /// The writing.
         job: Job<()>,
-        /// Where to.
-        path: PathBuf,
+        /// What is written, and where.
+        order: ExportOrder,
         /// The revision of the document's signs that is written.
         revision: u64,
     },
@@ -183,19 +184,24 @@ impl Work {
     }
 
     /// Starts to write the oriented scan; `None` when it is not oriented yet.
-    pub fn export(ctx: &egui::Context, session: &Session, path: &Path, overwrite_input: bool) -> Option<Self> {
+    pub fn export(ctx: &egui::Context, session: &Session, order: ExportOrder) -> Option<Self> {
         // A bit a point; what takes long is left to the job.
         let orientation = session.document.orientation()?.clone();
         let propagation = session.document.shared_propagation()?;
         let scan = Arc::clone(&session.scan);
         let options = WriteOptions {
             rule: session.rule()?,
-            overwrite_input,
+            overwrite_input: order.overwrite_input,
         };
-        let target = path.to_path_buf();
+        let (target, with_confidence) = (order.path.clone(), order.with_confidence);
         let job = Job::start(ctx, "export", "Writing", move |progress| {
             let normals = propagation.oriented_normals(&orientation);
-            scan.write(&normals, &target, &options, progress)
+            let confidence = if with_confidence {
+                Some(confidence::confidence(&propagation).ok_or_else(|| JobError::Failed(NO_CONFIDENCE.to_owned()))?)
+            } else {
+                None
+            };
+            scan.write_with_confidence(&normals, confidence.as_deref(), &target, &options, progress)
                 .map_err(|error| match error {
                     WriteError::Cancelled(_) => JobError::Cancelled,
                     error => JobError::Failed(about_target(&error.to_string(), &target.display().to_string())),
@@ -203,7 +209,7 @@ impl Work {
         });
         Some(Self::Export {
             job,
-            path: path.to_path_buf(),
+            order,
             revision: session.document.signs_revision(),
         })
     }
@@ -214,7 +220,8 @@ impl Work {
             Self::Open { origin, .. } => format!("Opening {}", theme::elided(&origin.name(), MAX_NAME)),
             Self::Propagate { .. } => "Orienting normals".to_owned(),
             Self::Pictures { .. } => "Drawing pictures".to_owned(),
-            Self::Export { path, .. } => {
+            Self::Export { order, .. } => {
+                let path = &order.path;
                 let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
                 format!("Exporting {}", theme::elided(&name, MAX_NAME))
             }

@@ -72,6 +72,11 @@ pub fn confidence(propagation: &Propagation) -> Option<Vec<u8>> {
     Some(confidence)
 }
 
+/// Whether [`confidence`] is known of this propagation, without computing it.
+pub fn is_known(propagation: &Propagation) -> bool {
+    propagation.patches.is_some() && propagation.evidence.is_some()
+}
+
 /// How many points are undecided: [`confidence`] of at most [`UNDECIDED`].
 pub fn n_undecided(confidence: &[u8]) -> usize {
     confidence.iter().filter(|&&c| c <= UNDECIDED).count()

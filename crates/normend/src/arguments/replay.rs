@@ -46,6 +46,10 @@ pub struct ReplayArguments {
     #[command(flatten)]
     pub propagation: PropagationArguments,
 
+    /// Write how sure the automatic method is of each normal before any mend: confidence and oriented, as normend orient does
+    #[arg(long)]
+    pub confidence: bool,
+
     /// Write a report, a JSON object, to FILE or to standard output (-)
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,

@@ -153,7 +153,8 @@ fn replay(arguments: &ReplayArguments, bar: &Bar) -> anyhow::Result<Replayed> {
     session.install(propagation);
     let sureness = if arguments.confidence {
         let found = session.document.propagation().and_then(confidence);
-        Some(found.context("--confidence is known for the automatic method only, and the recipe has another: say --preset auto, or leave it out")?)
+        Some(found.context("--confidence is known for the automatic method only, and the recipe has another: say --start estimate --preset auto, or \
+             leave it out")?)
     } else {
         None
     };

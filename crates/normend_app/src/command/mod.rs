@@ -12,6 +12,7 @@ use crate::coloring::Coloring;
 use crate::compare::Style;
 
 use crate::components::ComponentAction;
+use crate::panels::export::ExportOrder;
 use crate::source_kinds::SourceKind;
 use crate::suspects_list::SuspectAction;
 use crate::viewpoints::ViewpointAction;
@@ -91,12 +92,7 @@ pub enum Action {
     /// Let the user pick the target of the export with the system's dialog.
     BrowseExport,
     /// Write the oriented scan there.
-    ExportTo {
-        /// The file.
-        path: PathBuf,
-        /// The user agreed to replace the file that was opened.
-        overwrite_input: bool,
-    },
+    ExportTo(ExportOrder),
 }
 
 impl From<Command> for Action {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use egui::{Label, RichText, TextEdit, Ui};
+use egui::{Checkbox, Label, RichText, TextEdit, Ui};
 
 use super::modal;
 use super::open_path::typed_path;
@@ -11,6 +11,13 @@ use crate::theme::{self, SPACE_S};
 const WIDTH: f32 = 520.0;
 /// Room for the reason why nothing was exported, two lines of it, so that the window keeps its size.
 const PROBLEM_HEIGHT: f32 = 38.0;
+/// What confidence is, in the window.
+const CONFIDENCE: &str = "Adds two values to each point: confidence, from 0 to 1, how sure the automatic method was of \
+                          its side before any mend, and oriented, 0 where that was no more than a guess.\n\
+                          To PLY from PLY, or text whose columns have names.";
+/// Why there is none.
+pub(crate) const NO_CONFIDENCE: &str =
+    "Only the automatic method knows how sure it is: propagate with the preset Automatic first";
 
 /// The window with the target's path.
 #[derive(Clone, Debug)]
@@ -19,6 +26,10 @@ pub struct ExportWindow {
     path: String,
     input: Option<PathBuf>,
     replace: bool,
+    /// Whether confidence is written too, where it can be.
+    with_confidence: bool,
+    /// Confidence is known; `None` for what has none at all.
+    knows_confidence: Option<bool>,
     wants_focus: bool,
     checked: Option<(String, Existing)>,
     problem: Option<String>,
@@ -70,12 +81,18 @@ pub enum Decision {
     /// Pick the target with the system's dialog.
     Browse,
     /// Write there.
-    Export {
-        /// The file.
-        path: PathBuf,
-        /// The user agreed to replace the file that was opened.
-        overwrite_input: bool,
-    },
+    Export(ExportOrder),
+}
+
+/// What is written, and where.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ExportOrder {
+    /// The file.
+    pub path: PathBuf,
+    /// The user agreed to replace the file that was opened.
+    pub overwrite_input: bool,
+    /// How sure the automatic method is of each point is written too.
+    pub with_confidence: bool,
 }
 
 impl ExportWindow {
@@ -86,9 +103,19 @@ impl ExportWindow {
             path: path.display().to_string(),
             input,
             replace: false,
+            with_confidence: false,
+            knows_confidence: None,
             wants_focus: true,
             checked: None,
             problem: None,
+        }
+    }
+
+    /// The same window with a box for confidence, which can be ticked where it is `known`.
+    pub fn with_confidence(self, known: bool) -> Self {
+        Self {
+            knows_confidence: Some(known),
+            ..self
         }
     }
 
@@ -100,11 +127,12 @@ impl ExportWindow {
         }
     }
 
-    /// The window again after an export to `path` failed, with the reason.
-    pub fn after_failure(path: &Path, input: Option<PathBuf>, reason: String) -> Self {
+    /// The window again after an export failed, with the reason.
+    pub fn after_failure(order: &ExportOrder, input: Option<PathBuf>, reason: String) -> Self {
         Self {
             problem: Some(reason),
-            ..Self::new(path, input)
+            with_confidence: order.with_confidence,
+            ..Self::new(&order.path, input)
         }
     }
 
@@ -190,6 +218,16 @@ impl ExportWindow {
                 self.problem = None;
             }
         });
+        if let Some(known) = self.knows_confidence {
+            self.with_confidence &= known;
+            let confidence = ui.add_enabled(known, Checkbox::new(&mut self.with_confidence, "With confidence"));
+            let confidence = confidence
+                .on_hover_text(CONFIDENCE)
+                .on_disabled_hover_text(NO_CONFIDENCE);
+            if confidence.changed() {
+                self.problem = None;
+            }
+        }
         ui.vertical(|ui| {
             ui.set_min_height(PROBLEM_HEIGHT);
             let is_never = existing == Existing::Input && !self.words.may_replace_input;
@@ -210,10 +248,11 @@ impl ExportWindow {
             if export.clicked() || enter {
                 match (refusal, typed_path(&self.path)) {
                     (None, Some(path)) => {
-                        decision = Decision::Export {
+                        decision = Decision::Export(ExportOrder {
                             path,
                             overwrite_input: existing == Existing::Input,
-                        };
+                            with_confidence: self.with_confidence,
+                        });
                     }
                     (refusal, _) => {
                         self.problem = refusal.map(str::to_owned);
