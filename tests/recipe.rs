@@ -14,7 +14,7 @@ use std::process::{Command, Output, Stdio};
 
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use glam::Vec3;
 use normend_app::App;
 use normend_app::coloring::Coloring;
@@ -136,6 +136,42 @@ fn edits_of_a_crash_are_offered_and_come_back_with_their_history() {
     editor.click_button("Discard");
     assert!(!editor.shows("Restore 1 edit?") && editor.journals().is_empty());
     assert_eq!(editor.n_sources(), 0);
+}
+
+#[test]
+fn each_of_several_journals_can_be_looked_at_and_chosen() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    let scan = scan_of(&editor);
+    editor.wait_until_oriented();
+    editor.mend();
+    let mut editor = editor.crash_and_start(&scan);
+    editor.wait_until_oriented();
+    editor.click_button("Decide later");
+    mend_twice_and_undo(&mut editor);
+    editor.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+    let twice = editor.app().document().unwrap().state().clone();
+
+    let mut editor = editor.crash_and_start(&scan);
+    editor.wait_until_oriented();
+    assert_eq!(editor.journals().len(), 2);
+    for _ in 0..2 {
+        let is_first = editor.shows("Restore 2 edits?");
+        editor.click_button("Show another");
+        assert!(editor.shows(if is_first {
+            "Restore 1 edit?"
+        } else {
+            "Restore 2 edits?"
+        }));
+    }
+    if !editor.shows("Restore 2 edits?") {
+        editor.click_button("Show another");
+    }
+    editor.click_button("Restore");
+    editor.wait_until_oriented();
+    assert_eq!(editor.app().document().unwrap().state(), &twice);
+    assert_eq!(editor.journals().len(), 2, "the other is kept for another time");
 }
 
 #[test]
@@ -472,6 +508,71 @@ fn a_replay_gives_the_bytes_of_the_editors_export() {
             assert!(!mark.turns(normals[point as usize]), "{flags:?}: {point}");
         }
     }
+}
+
+#[test]
+fn confidence_is_exported_when_asked_and_known_and_replayed_the_same() {
+    let Some(mut editor) = start(sphere_with_wrong_cap) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    let folder = editor.folder.path().to_path_buf();
+    let is_disabled = |editor: &Editor| {
+        let found = editor.harness.get_by_role_and_label(Role::CheckBox, "With confidence");
+        found.accesskit_node().is_disabled()
+    };
+    // The normals that came with the file say nothing of how sure they are.
+    editor.key(Modifiers::COMMAND, Key::E);
+    assert!(is_disabled(&editor));
+    editor.key(Modifiers::NONE, Key::Escape);
+    let saved = folder.join("kept.normend");
+    save_recipe(&mut editor, &saved);
+    let output = normend(
+        &folder,
+        &["replay", "kept.normend", "sphere.ply", "-o", "none.ply", "--confidence"],
+    );
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("--start estimate --preset auto"));
+    assert!(!folder.join("none.ply").exists());
+
+    let parameters = Preset::Auto.parameters();
+    editor.harness.state_mut().act(Action::Propagate(parameters));
+    editor.wait("the automatic result", |app| {
+        !app.is_busy() && app.document().unwrap().parameters() == parameters
+    });
+    for command in [Asked::SelectAll, Asked::Flip] {
+        editor.harness.state_mut().act(command.into());
+        editor.harness.run_steps(2);
+    }
+    assert!(editor.app().document().unwrap().marks().len() > 3000);
+    editor.key(Modifiers::COMMAND, Key::E);
+    assert!(!is_disabled(&editor));
+    editor.harness.get_by_label("With confidence").click();
+    editor.harness.run_steps(2);
+    picture_of(&mut editor, "export_with_confidence.png");
+    let exported = folder.join("with_confidence.ply");
+    editor.type_export_path(&exported);
+    editor.click_button("Export");
+    editor.wait("an exported file", |app| !app.is_busy());
+    let bytes = fs::read(&exported).unwrap();
+    assert!(String::from_utf8_lossy(&bytes).contains("property float confidence\nproperty uchar oriented\n"));
+    assert_eq!(
+        normend_io::read(&exported, &Silent).unwrap().given_normals.unwrap().as_slice(),
+        editor.normals()
+    );
+
+    save_recipe(&mut editor, &folder.join("auto.normend"));
+    let output = normend(
+        &folder,
+        &["replay", "auto.normend", "sphere.ply", "-o", "replayed.ply", "--confidence"],
+    );
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert!(fs::read(folder.join("replayed.ply")).unwrap() == bytes);
 }
 
 #[test]
