@@ -452,3 +452,89 @@ impl App {
         self.recipe_job = Some(RecipeJob::Find(job));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+
+    use egui::{ViewportCommand, ViewportEvent, ViewportId};
+    use egui_kittest::Harness;
+
+    use super::*;
+    use crate::settings::SettingsStore;
+
+    /// The window's commands in the next frame, in which the desktop asks it to close or not.
+    fn commands(harness: &mut Harness<'_, App>, closes: bool) -> Vec<ViewportCommand> {
+        if closes {
+            let window = harness.input_mut().viewports.entry(ViewportId::ROOT).or_default();
+            window.events.push(ViewportEvent::Close);
+        }
+        harness.step();
+        if let Some(window) = harness.input_mut().viewports.get_mut(&ViewportId::ROOT) {
+            window.events.clear();
+        }
+        harness.output().viewport_output[&ViewportId::ROOT].commands.clone()
+    }
+
+    /// Begins to write a recipe, which ends as it is told to.
+    fn save(harness: &mut Harness<'_, App>) -> mpsc::Sender<Result<(), JobError>> {
+        let (end, told) = mpsc::channel();
+        let app = harness.state_mut();
+        let job = Job::start(&app.ctx, "recipe", "Writing the recipe", move |_| told.recv().unwrap());
+        app.recipe_job = Some(RecipeJob::Save {
+            job,
+            path: PathBuf::from("a.normend"),
+            offer: None,
+            closes: false,
+        });
+        end
+    }
+
+    fn wait(harness: &mut Harness<'_, App>, what: &str, holds: impl Fn(&App, &[ViewportCommand]) -> bool) {
+        for _ in 0..6000 {
+            let commands = commands(harness, false);
+            if holds(harness.state(), &commands) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        panic!("never came: {what}");
+    }
+
+    #[test]
+    fn closing_and_opening_wait_until_a_recipe_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let (settings, problem) = SettingsStore::load_from(folder.path());
+        let mut harness = Harness::builder().build_eframe(move |cc| App::with_settings(cc, None, settings, problem));
+
+        let end = save(&mut harness);
+        assert!(commands(&mut harness, true).contains(&ViewportCommand::CancelClose));
+        end.send(Err(JobError::Failed("The disk is full".to_owned()))).unwrap();
+        wait(&mut harness, "the failure", |app, commands| {
+            assert!(
+                !commands.contains(&ViewportCommand::Close),
+                "the user decides once more"
+            );
+            let words = "The recipe was not saved. The disk is full.";
+            app.messages.entries().iter().any(|entry| entry.text == words)
+        });
+
+        let end = save(&mut harness);
+        assert!(commands(&mut harness, true).contains(&ViewportCommand::CancelClose));
+        end.send(Ok(())).unwrap();
+        wait(&mut harness, "the end", |_, commands| {
+            commands.contains(&ViewportCommand::Close)
+        });
+        assert!(!commands(&mut harness, true).contains(&ViewportCommand::CancelClose));
+
+        let end = save(&mut harness);
+        harness.state_mut().open(ScanOrigin::Sample);
+        for _ in 0..100 {
+            harness.step();
+            std::thread::sleep(Duration::from_millis(5));
+            assert!(harness.state().session.is_none(), "the recipe is of what is open now");
+        }
+        end.send(Ok(())).unwrap();
+        wait(&mut harness, "the scan", |app, _| app.session.is_some());
+    }
+}
