@@ -159,6 +159,7 @@ fn each_of_several_journals_can_be_looked_at_and_chosen() {
     for _ in 0..2 {
         let is_first = editor.shows("Restore 2 edits?");
         editor.click_button("Show another");
+        editor.harness.run_steps(3);
         assert!(editor.shows(if is_first {
             "Restore 1 edit?"
         } else {
@@ -167,6 +168,7 @@ fn each_of_several_journals_can_be_looked_at_and_chosen() {
     }
     if !editor.shows("Restore 2 edits?") {
         editor.click_button("Show another");
+        editor.harness.run_steps(3);
     }
     editor.click_button("Restore");
     editor.wait_until_oriented();

@@ -28,9 +28,11 @@ pub enum Decision {
     Keep,
     /// Ask again the next time.
     Later,
+    /// Ask about another one first.
+    Other,
 }
 
-/// Asks about a journal of the scan called `name`, which has `n_points` now. `n_more` are asked about another time.
+/// Asks about a journal of the scan called `name`, which has `n_points` now. `n_more` others can be asked about instead.
 pub fn ui(ui: &Ui, name: &str, n_points: usize, offer: &Offer, n_more: usize) -> Decision {
     let n_edits = theme::counted(offer.n_edits() as u64, "edit", "edits");
     let title = if offer.is_same {
@@ -85,11 +87,13 @@ pub fn ui(ui: &Ui, name: &str, n_points: usize, offer: &Offer, n_more: usize) ->
             let more = theme::counted(n_more as u64, "other journal", "other journals");
             weak(
                 ui,
-                format!("There is {more} of this scan, from editors that ran beside this one."),
+                format!(
+                    "There is {more} of this scan, from other times. What you do not choose stays, and is offered again."
+                ),
             );
         }
         ui.add_space(SPACE_S);
-        buttons(ui, offer.is_same)
+        buttons(ui, offer.is_same, n_more > 0)
     })
 }
 
@@ -110,7 +114,7 @@ fn kinds(ui: &mut Ui, offer: &Offer) {
     ui.add_space(SPACE_S);
 }
 
-fn buttons(ui: &mut Ui, is_same: bool) -> Decision {
+fn buttons(ui: &mut Ui, is_same: bool, has_others: bool) -> Decision {
     let mut decision = Decision::Wait;
     ui.horizontal(|ui| {
         let enter = modal::enter_pressed(ui);
@@ -145,6 +149,14 @@ fn buttons(ui: &mut Ui, is_same: bool) -> Decision {
             .clicked()
         {
             decision = Decision::Later;
+        }
+        if has_others
+            && ui
+                .button("Show another")
+                .on_hover_text("See the other edits of this scan")
+                .clicked()
+        {
+            decision = Decision::Other;
         }
     });
     decision
