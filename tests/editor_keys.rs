@@ -293,6 +293,7 @@ fn keys_mend_where_the_user_points_or_at_the_crosshair() {
     });
     assert!(n_tabs.is_some(), "Tab never comes to the view");
     editor.wait("a preview at the crosshair", |app| app.n_would_turn().is_some());
+    editor.harness.run_steps(2);
     let n_points = editor.app().n_would_turn().unwrap();
     let turns = format!(
         "A click turns {}",

@@ -202,3 +202,38 @@ fn where_nothing_is_suspected_it_says_why() {
     assert!(editor.said("Nothing is suspected"));
     assert_eq!(focus(&editor), None);
 }
+
+#[test]
+fn a_list_of_other_signs_says_so_and_the_next_suspect_is_looked_for_again() {
+    let Some(mut editor) = start(sphere_with_two_wrong_caps) else {
+        return;
+    };
+    editor.wait_until_oriented();
+    editor.click_button("Suspects");
+    step(&mut editor, Modifiers::NONE);
+    assert_eq!((focus(&editor), count(&editor, Standing::Open)), (Some(0), 2));
+    editor.key(Modifiers::NONE, Key::Escape);
+    let is_fresh = |app: &normend_app::App| {
+        let (list, document) = (app.suspects().unwrap(), app.document().unwrap());
+        list.status().is_none() && !list.is_old(document)
+    };
+    // All is turned around, and that is taken back: each time the list is of signs that are no more.
+    for (modifiers, is_turned_back) in [(Modifiers::NONE, false), (Modifiers::COMMAND, true)] {
+        if is_turned_back {
+            editor.key(modifiers, Key::Z);
+        } else {
+            editor.key(Modifiers::COMMAND, Key::A);
+            editor.key(modifiers, Key::X);
+        }
+        editor.harness.run_steps(2);
+        assert!(editor.shows("Signs changed since this was looked for."));
+        for words in ["Nothing is suspected", " flipped", "of the points is seen"] {
+            assert!(!editor.shows(words), "{words}, by a list of other signs");
+        }
+        editor.key(Modifiers::NONE, Key::N);
+        editor.wait("a new list", is_fresh);
+        editor.harness.run_steps(3);
+        assert!(!editor.shows("Signs changed since this was looked for."));
+    }
+    assert_eq!((focus(&editor), count(&editor, Standing::Open)), (Some(0), 2));
+}

@@ -133,8 +133,12 @@ impl App {
     /// Makes the edit that settles a suspect, and goes on to the next.
     fn settle_suspect(&mut self, index: usize, edit: Option<normend_core::Edit>) {
         let Some(edit) = edit else { return };
+        let Some(before) = self.document().map(normend_core::Document::signs_revision) else {
+            return;
+        };
         self.apply_edit(edit);
         let Some(session) = &mut self.session else { return };
+        session.suspects.follow_flip(before, &session.document);
         session.suspects.follow(&session.document);
         let is_settled = session
             .suspects
@@ -156,7 +160,11 @@ impl App {
     fn step_suspect(&mut self, forward: bool) {
         let Some(session) = &mut self.session else { return };
         let list = &mut session.suspects;
-        if !list.is_known() {
+        list.follow(&session.document);
+        // A list of another state says nothing; nor does one that is all settled by now.
+        let is_spent =
+            list.is_stale(&session.document) || (list.is_old(&session.document) && list.neighbor(forward).is_none());
+        if !list.is_known() || is_spent {
             if let Some(Some(reason)) = list.stopped() {
                 self.messages.error(format!("{reason} No suspects were looked for."));
                 return;
@@ -168,7 +176,6 @@ impl App {
             }
             return;
         }
-        list.follow(&session.document);
         match list.neighbor(forward) {
             Some(index) => self.focus_suspect(index),
             None => self.messages.note("Nothing is suspected; the tab Suspects says why."),

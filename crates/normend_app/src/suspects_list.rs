@@ -5,6 +5,7 @@
 //!
 //! Invariant: nothing here changes the document; the editor does, by [`Edit::FlipPoints`] and [`Edit::Accept`].
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -128,6 +129,8 @@ pub struct SuspectsList {
     /// What the present rows are of; `None` before the first.
     basis: Option<Basis>,
     rows: Vec<Row>,
+    /// Revisions of the signs to which only flips of rows have led since.
+    reviewed: BTreeSet<u64>,
     grounds: Option<Grounds>,
     /// The automatic propagation of this cloud, where the one in force is another.
     automatic: Option<Arc<Propagation>>,
@@ -235,6 +238,7 @@ impl SuspectsList {
 
     fn forget_rows(&mut self) {
         self.rows.clear();
+        self.reviewed.clear();
         self.standings.clear();
         (self.basis, self.grounds, self.focus, self.standings_of) = (None, None, None, None);
         self.generation += 1;
@@ -277,6 +281,19 @@ impl SuspectsList {
         self.basis
             .as_ref()
             .is_some_and(|basis| basis.signs_revision != revision)
+    }
+
+    /// Whether signs changed since the list was made by anything but flips of its rows, so that it is a list of another state.
+    pub fn is_stale(&self, document: &Document) -> bool {
+        self.is_old(document) && !self.reviewed.contains(&document.signs_revision())
+    }
+
+    /// Remembers that a row was flipped in a document whose signs had the revision `before`.
+    pub fn follow_flip(&mut self, before: u64, document: &Document) {
+        let was_of_list = self.basis.as_ref().is_some_and(|basis| basis.signs_revision == before);
+        if was_of_list || self.reviewed.contains(&before) {
+            self.reviewed.insert(document.signs_revision());
+        }
     }
 
     /// All that was found, the most likely and largest first, with what became of each.
@@ -487,8 +504,12 @@ mod tests {
         list.set_focus(Some(0));
         assert!(!list.is_old(&document));
 
+        let before = document.signs_revision();
         document.apply(list.flip(0).unwrap()).unwrap();
         list.follow(&document);
+        assert!(list.is_stale(&document), "nobody said that it was a flip of the list");
+        list.follow_flip(before, &document);
+        assert!(list.is_old(&document) && !list.is_stale(&document));
         assert_eq!(
             (list.focus(), list.neighbor(true), list.count(Standing::Turned)),
             (None, None, 1)
@@ -498,6 +519,10 @@ mod tests {
         list.follow(&document);
         assert_eq!((list.neighbor(true), list.count(Standing::Open)), (Some(0), 1));
         assert!(!list.is_old(&document));
+        // Something else is done instead.
+        document.apply(Edit::TurnWhole(0)).unwrap();
+        list.follow_flip(before + 1_000_000, &document);
+        assert!(list.is_stale(&document));
     }
 
     #[test]

@@ -48,18 +48,19 @@ pub fn ui(ui: &mut Ui, session: &mut Session, pictures: &mut SuspectPictures) ->
     }
     let [n_open, n_turned, n_accepted] =
         [Standing::Open, Standing::Turned, Standing::Accepted].map(|standing| list.count(standing));
+    let is_old = list.is_old(&session.document);
     if list.status().is_none() {
+        if is_old {
+            ui.add(Label::new("Signs changed since this was looked for.").wrap());
+        }
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = SPACE_XS;
-            action = buttons(ui, n_open > 0).or(action.take());
-            let is_old = list.is_old(&session.document);
+            // From an old list, too, the next is found by looking again.
+            action = buttons(ui, n_open > 0 || is_old).or(action.take());
             if look_button(ui, is_old) {
                 action = Some(SuspectAction::Look.into());
             }
         });
-        if list.is_old(&session.document) {
-            hint(ui, "Signs changed since this was looked for.");
-        }
     }
     let mut summary = vec![theme::counted(n_open as u64, "suspect", "suspects")];
     if n_turned > 0 {
@@ -69,9 +70,11 @@ pub fn ui(ui: &mut Ui, session: &mut Session, pictures: &mut SuspectPictures) ->
         summary.push(format!("{} accepted", theme::thousands(n_accepted as u64)));
     }
     ui.add_space(SPACE_XS);
-    if n_open > 0 {
+    if list.is_stale(&session.document) {
+        // What it counts is of signs that are no more.
+    } else if n_open > 0 || (is_old && summary.len() > 1) {
         ui.label(RichText::new(summary.join(" · ")).weak());
-    } else {
+    } else if !is_old {
         ui.label(RichText::new("Nothing is suspected").strong());
         if let Some(grounds) = list.grounds() {
             ui.add(Label::new(RichText::new(belief(grounds)).weak()).wrap());
