@@ -136,6 +136,8 @@ fn entries(ctx: &Context) -> Vec<Id> {
         let widgets = viewport.prev_pass.widgets.get_layer(layer);
         let mut entries: Vec<_> = widgets
             .filter(|widget| widget.enabled && widget.sense.is_focusable() && widget.sense.senses_click())
+            // The bar of a list that scrolls is no entry; it alone is higher than wide.
+            .filter(|widget| widget.rect.width() > widget.rect.height())
             .collect();
         entries.sort_by(|a, b| a.rect.top().total_cmp(&b.rect.top()));
         entries.into_iter().map(|widget| widget.id).collect()

@@ -2,38 +2,55 @@
 
 use std::path::PathBuf;
 
-use egui::{Button, Ui};
+use egui::{Button, ScrollArea, Ui};
 
 use super::Availability;
 use crate::command::{Action, Command, Menu};
 use crate::dialogs;
 use crate::theme::{self, SPACE_S, SPACE_XS};
 
-/// The menu bar. `recent` are the scans opened last.
+/// Least height of an open menu, in points: a few entries, even where the window has less room.
+const MIN_HEIGHT: f32 = 96.0;
+
+/// The menu bar; a menu that is longer than the window scrolls. `recent` are the scans opened last.
 pub fn menus(ui: &mut Ui, availability: &Availability<'_>, recent: &[PathBuf]) -> Option<Action> {
     let mut action = None;
+    let bar_bottom = ui.cursor().top() + ui.spacing().interact_size.y;
     egui::MenuBar::new().ui(ui, |ui| {
         for menu in Menu::ALL {
-            ui.menu_button(menu.label(), |ui| {
+            let button = ui.menu_button(menu.label(), |ui| {
                 ui.set_min_width(232.0);
-                let mut group = None;
-                for command in menu.commands() {
-                    if group.is_some_and(|group| group != command.group()) {
-                        ui.separator();
-                    }
-                    group = Some(command.group());
-                    if item(ui, command, availability) {
-                        action = Some(command.into());
-                    }
-                    if command == Command::OpenSample
-                        && let Some(chosen) = recent_menu(ui, recent)
-                    {
-                        action = Some(chosen);
-                    }
-                }
+                // Below the bar, so that the names of the other menus stay in reach; the frame is around it.
+                let frame = egui::Frame::menu(ui.style()).total_margin().sum().y;
+                let room = ui.ctx().content_rect().bottom() - bar_bottom - frame - SPACE_S;
+                ScrollArea::vertical()
+                    .max_height(room.max(MIN_HEIGHT))
+                    .show(ui, |ui| entries(ui, menu, availability, recent))
+                    .inner
             });
+            action = button.inner.flatten().or(action.take());
         }
     });
+    action
+}
+
+fn entries(ui: &mut Ui, menu: Menu, availability: &Availability<'_>, recent: &[PathBuf]) -> Option<Action> {
+    let mut action = None;
+    let mut group = None;
+    for command in menu.commands() {
+        if group.is_some_and(|group| group != command.group()) {
+            ui.separator();
+        }
+        group = Some(command.group());
+        if item(ui, command, availability) {
+            action = Some(command.into());
+        }
+        if command == Command::OpenSample
+            && let Some(chosen) = recent_menu(ui, recent)
+        {
+            action = Some(chosen);
+        }
+    }
     action
 }
 
@@ -44,6 +61,10 @@ fn item(ui: &mut Ui, command: Command, availability: &Availability<'_>) -> bool 
         button = button.shortcut_text(keys);
     }
     let response = ui.add_enabled(available.is_ok(), button);
+    if response.gained_focus() {
+        // The arrow keys go on where the menu is cut off.
+        response.scroll_to_me(None);
+    }
     match available {
         Ok(()) => response.on_hover_text(command.tooltip()).clicked(),
         Err(reason) => response.on_disabled_hover_text(reason).clicked(),
