@@ -20,7 +20,12 @@ pub fn ui(
     adapter: &str,
 ) {
     if let Some(tool) = tool {
-        hint_line(ui, tool);
+        let propagation = session.and_then(|session| session.document.propagation());
+        hint_line(
+            ui,
+            tool,
+            propagation.is_some_and(|propagation| propagation.patches.is_some()),
+        );
     }
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = SPACE_M;
@@ -35,7 +40,7 @@ pub fn ui(
                 if session.n_interactions > 0 {
                     ui.label(RichText::new("·").weak());
                     ui.label(theme::counted(session.n_interactions, "interaction", "interactions"))
-                        .on_hover_text("Clicks, strokes and other edits so far, those that were taken back too");
+                        .on_hover_text(INTERACTIONS);
                 }
                 if let Some(judged) = judged {
                     ui.label(RichText::new("·").weak());
@@ -86,12 +91,13 @@ fn keys_of_size(ctx: &egui::Context) -> String {
 }
 
 /// How the tool is used, from its own rows; as many as there is room for.
-fn hint_line(ui: &mut Ui, tool: Tool) {
+fn hint_line(ui: &mut Ui, tool: Tool, has_patches: bool) {
     let font = egui::TextStyle::Small.resolve(ui.style());
     let mut line = LayoutJob::default();
     let mut add = |text: &str, color| line.append(text, 0.0, TextFormat::simple(font.clone(), color));
     let (weak, strong) = (ui.visuals().weak_text_color(), ui.visuals().text_color());
-    for (index, hint) in tool.hints().iter().enumerate() {
+    let hints = tool.hints().iter().filter(|hint| has_patches || !hint.is_about_sizes());
+    for (index, hint) in hints.enumerate() {
         let Some(how) = hint.how_text(ui.ctx()) else { continue };
         add(if index == 0 { tool.label() } else { "" }, theme::accent(ui));
         add(if index == 0 { "     " } else { "      " }, weak);
@@ -101,6 +107,10 @@ fn hint_line(ui: &mut Ui, tool: Tool) {
     ui.add(egui::Label::new(line).truncate())
         .on_hover_text(Command::Shortcuts.tooltip_with_keys(ui.ctx()));
 }
+
+/// What is counted.
+const INTERACTIONS: &str = "Clicks, strokes and commands that changed something, as in Liu et al., figure 8; undo does not take \
+                            them back";
 
 /// What to do about components that could face either way.
 const EITHER_WAY: &str = "Nothing tells which side of them is the right one: they are seen from both sides, or from none.\n\

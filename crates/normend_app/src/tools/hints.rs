@@ -38,6 +38,11 @@ impl Hint {
         }
     }
 
+    /// Whether it says how to choose among patches, which only some propagations have.
+    pub fn is_about_sizes(&self) -> bool {
+        *self == RESIZE
+    }
+
     /// How, in words, with the user's keys; `None` for a command without keys.
     pub fn how_text(&self, ctx: &egui::Context) -> Option<String> {
         match self.how {
