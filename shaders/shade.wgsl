@@ -259,7 +259,7 @@ fn splat_color(pixel: vec2<i32>, id: u32, surface: vec2<u32>, depth: f32) -> vec
 // A small ball, `r` radii from its middle, with a light rim that sets it off from what has its color.
 fn ball_color(r: f32) -> vec3<f32> {
     let light = mix(0.7, 1.0, sqrt(max(1.0 - r * r, 0.0)));
-    return mix(look.wrong * light, vec3<f32>(1.0), 0.6 * smoothstep(0.75, 1.0, r));
+    return mix(look.wrong * light, vec3<f32>(1.0), 0.8 * smoothstep(0.75, 1.0, r));
 }
 
 fn opaque_color(position: vec2<f32>, here: vec2<u32>) -> vec3<f32> {
@@ -293,7 +293,8 @@ fn opaque_color(position: vec2<f32>, here: vec2<u32>) -> vec3<f32> {
     } else {
         color = mix(color, background(position.y), look.dim_unselected);
     }
-    if has_flag(FLAG_WRONG, here.x - 1u) && from_center <= frame.ball_radius {
+    // What is wrong is so by the present signs.
+    if signs == FLAG_TURNED && has_flag(FLAG_WRONG, here.x - 1u) && from_center <= frame.ball_radius {
         color = ball_color(from_center / frame.ball_radius);
     }
     if look.n_highlights > 0u && is_highlighted(here.x) {

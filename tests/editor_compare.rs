@@ -186,12 +186,14 @@ fn wrong_points_are_marked_and_counted_with_every_edit() {
     editor.harness.state_mut().act(Action::OpenReference(path));
     editor.wait("the counts", |app| app.comparing().judged().is_some());
     editor.harness.run_steps(3);
+    assert_eq!(editor.app().comparing().other, Other::Reference);
+    assert!(editor.app().availability(Command::NextWrong).is_ok());
     let judged = editor.app().comparing().judged().unwrap();
     assert_eq!(judged.n_judged(), N_POINTS as u64);
     assert_eq!(judged.n_wrong(), n_cap as u64);
     let label = format!("{n_cap} wrong points");
     assert!(editor.shows(&label), "{label}");
-    let is_ball = |[red, green, blue]: [u8; 3]| blue > 120 && red < 60 && green < 80;
+    let is_ball = |[red, green, blue]: [u8; 3]| blue > 45 && red < 30 && green < 30;
     let n_marked = editor.picture().count(is_ball);
     assert!(n_marked > 500, "{n_marked}");
     editor.wait("the regions", |app| app.comparing().regions().is_some());
@@ -225,6 +227,8 @@ fn wrong_points_are_marked_and_counted_with_every_edit() {
     });
     editor.harness.run_steps(2);
     assert!(editor.shows("No point is wrong"));
+    let refusal = editor.app().availability(Command::NextWrong);
+    assert_eq!(refusal, Err("no point is wrong against the reference"));
     editor.key(Modifiers::COMMAND, Key::Z);
     editor.wait_until_oriented();
     editor.wait("the counts", |app| {

@@ -60,6 +60,7 @@ fn undo_takes_parameters_back_and_orients_again() {
         !app.is_busy() && start_of(app) == Start::Estimate
     });
     assert!(editor.app().is_unsaved());
+    assert!(editor.shows("Estimated (the file has some)"));
     let estimated = editor.bits();
 
     editor.key(Modifiers::COMMAND, Key::Z);
@@ -67,6 +68,7 @@ fn undo_takes_parameters_back_and_orients_again() {
         !app.is_busy() && start_of(app) == Start::Keep
     });
     assert_eq!(editor.bits(), kept);
+    assert!(editor.shows("In the file"));
     assert!(!editor.app().is_unsaved());
     editor.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
     editor.wait("estimated normals again", |app| {

@@ -4,6 +4,7 @@ use normend_core::Document;
 
 use crate::app::App;
 use crate::command::Command;
+use crate::compare::NONE_WRONG;
 use crate::session::Session;
 use crate::work::Work;
 
@@ -111,10 +112,14 @@ impl App {
                 check(self.scene.is_some(), "there is no graphics adapter")?;
                 check(self.work.is_none(), "wait for the running work, or cancel it")
             }
-            Command::NextWrong | Command::PreviousWrong => check(
-                self.comparing.reference().is_some(),
-                "open a reference first (File, Compare with reference)",
-            ),
+            Command::NextWrong | Command::PreviousWrong => {
+                check(
+                    self.comparing.reference().is_some(),
+                    "open a reference first (File, Compare with reference)",
+                )?;
+                let live = self.comparing.judged();
+                check(live.is_none_or(|live| live.n_wrong() > 0), NONE_WRONG)
+            }
             Command::BrushTool
             | Command::LassoTool
             | Command::RectangleTool

@@ -73,6 +73,8 @@ impl Other {
     }
 }
 
+/// Why there is no wrong region to go to.
+pub const NONE_WRONG: &str = "no point is wrong against the reference";
 /// Seconds that each is shown when they are shown in turn: one change in half a second is no flicker.
 pub const BLINK_SECS: f64 = 0.5;
 /// A key that is held longer compares for as long as it is held.
@@ -341,6 +343,7 @@ impl App {
                 Ok(reference) => {
                     self.messages.info(format!("Comparing with {path}."));
                     comparing.reference = Some(reference);
+                    comparing.other = Other::Reference;
                 }
                 Err(JobError::Cancelled) => {}
                 Err(JobError::Failed(reason)) => {

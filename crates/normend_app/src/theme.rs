@@ -238,6 +238,7 @@ pub fn palette(choice: PaletteChoice, dark: bool) -> Palette {
             front: [0.45, 0.80, 0.45],
             back: [0.55, 0.30, 0.75],
             highlight: [1.0, 0.93, 0.25],
+            wrong: [0.0, 0.0, 0.125],
             background: background(dark),
             ..Palette::BLUE_ORANGE
         },
@@ -245,6 +246,7 @@ pub fn palette(choice: PaletteChoice, dark: bool) -> Palette {
             front: [0.93, 0.79, 0.28],
             back: [0.16, 0.36, 0.78],
             highlight: [1.0, 0.45, 0.40],
+            wrong: [0.0, 0.0, 0.125],
             background: background(dark),
             ..Palette::BLUE_ORANGE
         },
@@ -510,6 +512,12 @@ mod tests {
                         highlighted >= 10.0,
                         "{choice:?}, {vision}: highlight at {highlighted:.1}"
                     );
+                    // Balls on wrong points stand on either side, in any light.
+                    let marked = (lights.into_iter())
+                        .flat_map(|light| [seen(palette.front, light), seen(palette.back, light)])
+                        .map(|side| distance(seen(palette.wrong, 1.0), side))
+                        .fold(f32::INFINITY, f32::min);
+                    assert!(marked >= 18.0, "{choice:?}, {vision}: wrong points at {marked:.1}");
                 }
             }
         }

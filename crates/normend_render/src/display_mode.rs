@@ -79,7 +79,7 @@ impl Palette {
         highlight: [1.0, 0.93, 0.25],
         selected: [0.86, 0.10, 0.58],
         surface: [0.80, 0.79, 0.77],
-        wrong: [0.06, 0.13, 0.86],
+        wrong: [0.01, 0.02, 0.30],
     };
 
     /// Light gray front, black back, on white, as the figures of Liu et al. show orientation.
@@ -88,6 +88,7 @@ impl Palette {
         back: [0.0, 0.0, 0.0],
         background: [1.0, 1.0, 1.0],
         highlight: [0.98, 0.55, 0.10],
+        wrong: [0.06, 0.13, 0.86],
         ..Self::BLUE_ORANGE
     };
 }

@@ -4,7 +4,7 @@ use egui::{Button, ComboBox, Label, RichText, Slider, Ui};
 use normend_core::Document;
 
 use crate::command::{Action, Command};
-use crate::compare::{Comparing, Other, Style};
+use crate::compare::{Comparing, NONE_WRONG, Other, Style};
 use crate::theme::{self, SPACE_XS};
 
 /// What the section is for.
@@ -116,9 +116,10 @@ fn against_reference(ui: &mut Ui, comparing: &mut Comparing) -> Option<Action> {
     }
     let mut closes = false;
     ui.horizontal(|ui| {
-        let next = ui.button(Command::NextWrong.label());
+        let next = ui.add_enabled(live.n_wrong() > 0, Button::new(Command::NextWrong.label()));
         let tooltip = Command::NextWrong.tooltip_with_keys(ui.ctx());
-        if next.on_hover_text(tooltip).clicked() {
+        let next = next.on_hover_text(tooltip).on_disabled_hover_text(NONE_WRONG);
+        if next.clicked() {
             action = Some(Command::NextWrong.into());
         }
         closes = ui

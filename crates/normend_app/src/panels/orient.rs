@@ -38,15 +38,15 @@ fn scan(ui: &mut Ui, session: &Session) {
             "Size",
             format!("{:.4} × {:.4} × {:.4}", Short(size.x), Short(size.y), Short(size.z)),
         );
-        theme::row(
-            ui,
-            "Normals",
-            if session.scan.given_normals.is_some() {
-                "In the file"
-            } else {
-                "None in the file"
-            },
-        );
+        // What the propagation in force made of them.
+        let start = session.document.propagation().map(|found| found.parameters.start);
+        let normals = match (session.scan.given_normals.is_some(), start) {
+            (true, Some(Start::Estimate)) => "Estimated (the file has some)",
+            (true, _) => "In the file",
+            (false, Some(_)) => "Estimated (none in the file)",
+            (false, None) => "None in the file",
+        };
+        theme::row(ui, "Normals", normals);
     });
 }
 

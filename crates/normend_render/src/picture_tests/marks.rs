@@ -424,7 +424,7 @@ fn wrong_points_have_blue_balls_and_are_picked_as_themselves() {
     scene.renderer.mark_wrong(&queue, &[instance..instance + 1]);
     assert_eq!(scene.renderer.bytes_uploaded() - uploaded, 4);
     let after = scene.shoot();
-    let blue = |[r, g, b]: [u8; 3]| b > 100 && r < b / 2 && g < b / 2;
+    let blue = |[r, g, b]: [u8; 3]| b > 45 && r < b / 2 && g < b / 2;
     assert_eq!(before.colors.iter().filter(|&&color| blue(color)).count(), 0);
     let n_blue = after.colors.iter().filter(|&&color| blue(color)).count();
     // The inner part of a disc of radius 4 pixels.
@@ -440,6 +440,31 @@ fn wrong_points_have_blue_balls_and_are_picked_as_themselves() {
     let far = far.unwrap();
     scene.renderer.set_wrong(&queue, &words(cloud.len(), far..far + 1));
     assert!(scene.shoot().colors == before.colors);
+}
+
+#[test]
+fn wrong_points_are_marked_where_the_present_signs_are_shown() {
+    let cloud = sphere();
+    let Some(mut scene) = Scene::new(&cloud) else { return };
+    let queue = scene.gpu.queue.clone();
+    let split = SIZE[0] / 2;
+    scene.settings.compare = Compare::Split(split as f32);
+    scene.renderer.set_compared(&queue, Some(&vec![0; 625]));
+    scene.renderer.set_wrong(&queue, &vec![u32::MAX; 625]);
+    // Pixels of balls left of the line and right of it.
+    let n_balls = |picture: &Picture| {
+        let blue = |[r, g, b]: [u8; 3]| b > 45 && r < b / 2 && g < b / 2;
+        let balls = (0..).zip(&picture.colors).filter(|&(_, &color)| blue(color));
+        let (left, right): (Vec<_>, Vec<_>) = balls.partition(|&(at, _)| at % SIZE[0] < split);
+        [left.len(), right.len()]
+    };
+    let [left, right] = n_balls(&scene.shoot());
+    assert!(left == 0 && right > 1000, "{left} left, {right} right of the line");
+    scene.settings.compare = Compare::All;
+    assert_eq!(n_balls(&scene.shoot()), [0, 0]);
+    scene.settings.compare = Compare::Off;
+    let [left, right] = n_balls(&scene.shoot());
+    assert!(left > 1000 && right > 1000, "{left} left, {right} right");
 }
 
 #[test]
