@@ -52,6 +52,8 @@ impl App {
             Action::Compare(style) => self.toggle_compare(style),
             Action::OpenReference(path) => self.open_reference(&path),
             Action::ShowWrong(index) => self.show_wrong(index),
+            Action::Theme(theme) => self.settings.settings.theme = theme,
+            Action::InterfaceScale(scale) => self.settings.settings.ui_scale = scale,
             Action::ClearRecent => self.settings.settings.recent.clear(),
             Action::Propagate(parameters) => {
                 if let Some(session) = &mut self.session {
@@ -260,7 +262,11 @@ impl App {
                 self.windows.preferences_view.rest();
             }
             Command::Palette => self.windows.modal = Some(Modal::Palette(PaletteWindow::default())),
-            Command::ShowHints => self.settings.settings.dismissed_hints.clear(),
+            Command::ShowHints => {
+                self.settings.settings.dismissed_hints.clear();
+                self.settings.settings.shows_hints = true;
+                self.hint_pace.restart();
+            }
             Command::Shortcuts => {
                 let is_open = self.windows.shortcuts.is_some();
                 self.windows.shortcuts = (!is_open).then(String::new);
@@ -649,6 +655,9 @@ impl App {
         } = propagation;
         let secs: f64 = propagation.seconds.iter().map(|(_, secs)| secs).sum();
         let is_from_one_place = propagation.found_station.is_some();
+        let drops_given = session.requested.start == Start::Estimate
+            && session.document.given_normals().is_some()
+            && (session.document.propagation()).is_some_and(|former| former.parameters.start == Start::Keep);
         session.install(propagation);
         if let Some(scene) = &mut self.scene {
             if crash::is_loss_asked_for() {
@@ -669,6 +678,9 @@ impl App {
                 (Start::Keep, n_fitted) => format!(
                     "Kept the given normals of {n_points}, {} of them fitted because the file has none ({time:.1} s).",
                     theme::thousands(n_fitted as u64)
+                ),
+                (Start::Estimate, _) if drops_given => format!(
+                    "Oriented {n_points} in {time:.1} s with normals estimated anew: those of the file are not kept. Undo brings them back."
                 ),
                 (Start::Estimate, _) => format!("Oriented {n_points} in {time:.1} s."),
             });

@@ -88,6 +88,7 @@ pub struct App {
     /// The suspect whose points are outlined in the view: which list, which row.
     pub(crate) outlined_suspect: Option<(u64, usize)>,
     pub(crate) hovered: Option<Pixel>,
+    pub(crate) hint_pace: hints::Pace,
     gpu_errors: mpsc::Receiver<String>,
     title: String,
     window_place: WindowPlace,
@@ -174,6 +175,7 @@ impl App {
             steps_to_suspect: None,
             outlined_suspect: None,
             hovered: None,
+            hint_pace: hints::Pace::default(),
             gpu_errors,
             title: String::new(),
             window_place,
@@ -488,15 +490,15 @@ impl App {
 
     /// The hint that is due, if any; what the user has done by himself needs no hint any more.
     fn show_hint(&mut self, ui: &Ui, area: egui::Rect) {
-        // The card that asks for an answer stands where the hint would.
-        if self.proposal.is_some() {
+        // The card that asks for an answer stands where the hint would, and who waits for work reads how far it is.
+        if !self.settings.settings.shows_hints || self.proposal.is_some() || self.work.is_some() {
             return;
         }
         let document = self.document();
         let propagation = document.and_then(Document::propagation);
         let is_open = self.settings.settings.side_tab == SideTab::Suspects;
         let progress = hints::Progress {
-            is_oriented: propagation.is_some() && self.work.is_none(),
+            is_oriented: propagation.is_some(),
             n_steps: document.map_or(0, Document::n_done),
             has_patches: propagation.is_some_and(|propagation| propagation.patches.is_some()),
             lists_suspects: is_open && self.suspects().is_some_and(|list| list.count(Standing::Open) > 0),
@@ -504,7 +506,9 @@ impl App {
             is_journaled: self.session.as_ref().is_some_and(Session::is_kept),
         };
         let dismissed = &mut self.settings.settings.dismissed_hints;
-        if let Some(card) = hints::due(dismissed, progress)
+        let due = hints::due(dismissed, progress);
+        let now = ui.input(|input| input.time);
+        if let Some(card) = self.hint_pace.show(due, now)
             && hints::ui(ui, area, card)
         {
             dismissed.insert(card.name().to_owned());

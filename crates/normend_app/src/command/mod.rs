@@ -13,6 +13,7 @@ use crate::compare::Style;
 
 use crate::components::ComponentAction;
 use crate::panels::export::ExportOrder;
+use crate::settings::ThemeChoice;
 use crate::source_kinds::SourceKind;
 use crate::suspects_list::SuspectAction;
 use crate::viewpoints::ViewpointAction;
@@ -32,6 +33,10 @@ pub enum Action {
     OpenScan(PathBuf),
     /// Open this recipe for the scan.
     OpenRecipe(PathBuf),
+    /// Light or dark.
+    Theme(ThemeChoice),
+    /// Scale text and widgets by this.
+    InterfaceScale(f32),
     /// Forget the recent scans.
     ClearRecent,
     /// Color the splats this way.

@@ -18,6 +18,9 @@ const N_BEFORE_HISTORY: usize = 3;
 const N_BEFORE_TOOLS: usize = 4;
 const N_BEFORE_FACE_ME: usize = 6;
 
+/// Seconds from the end of one hint to the next: hints must not become work.
+const REST_SECS: f64 = 60.0;
+
 /// One hint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Card {
@@ -175,6 +178,32 @@ pub fn due(dismissed: &BTreeSet<String>, progress: Progress) -> Option<Card> {
         .find(|card| !dismissed.contains(card.name()) && card.is_due(progress))
 }
 
+/// Keeps hints apart from each other.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pace {
+    shown: Option<Card>,
+    /// No other one comes before, in seconds of the interface's clock.
+    rests_until: f64,
+}
+
+impl Pace {
+    /// What to show at the time `now`, in seconds, when `due` is due: a hint that is shown stays while it is due.
+    pub fn show(&mut self, due: Option<Card>, now: f64) -> Option<Card> {
+        if self.shown.is_some() && self.shown != due {
+            (self.shown, self.rests_until) = (None, now + REST_SECS);
+        }
+        if now >= self.rests_until {
+            self.shown = due;
+        }
+        self.shown
+    }
+
+    /// The next hint may come at once, as when the user asks for hints.
+    pub fn restart(&mut self) {
+        *self = Self::default();
+    }
+}
+
 /// Shows a hint in the lower right corner of `view`, where nothing else is: left of it are the axes, above is the middle.
 /// Says whether the user dismisses it. In a view that has no room it is not shown.
 pub fn ui(ui: &Ui, view: Rect, card: Card) -> bool {
@@ -194,7 +223,9 @@ pub fn ui(ui: &Ui, view: Rect, card: Card) -> bool {
                 ui.spacing_mut().item_spacing.y = SPACE_S;
                 ui.label(RichText::new(card.title()).color(theme::accent(ui)).strong());
                 ui.add(Label::new(card.text(ui.ctx())).wrap());
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                // As high as the button: by itself the row would take all that is left of the view.
+                let row = Vec2::new(width, ui.spacing().interact_size.y);
+                ui.allocate_ui_with_layout(row, Layout::right_to_left(Align::Center), |ui| {
                     let button = ui.add(Button::new("Got it"));
                     dismissed = button.on_hover_text("This hint does not come again").clicked();
                 });
@@ -206,6 +237,23 @@ pub fn ui(ui: &Ui, view: Rect, card: Card) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_hint_at_most_each_minute() {
+        let mut pace = Pace::default();
+        assert_eq!(pace.show(Some(Card::Look), 5.0), Some(Card::Look));
+        assert_eq!(
+            pace.show(Some(Card::Look), 500.0),
+            Some(Card::Look),
+            "it stays as long as it is due"
+        );
+        assert_eq!(pace.show(Some(Card::Point), 501.0), None);
+        assert_eq!(pace.show(Some(Card::Point), 560.0), None);
+        assert_eq!(pace.show(Some(Card::Point), 561.0), Some(Card::Point));
+        assert_eq!(pace.show(None, 562.0), None);
+        pace.restart();
+        assert_eq!(pace.show(Some(Card::Look), 563.0), Some(Card::Look));
+    }
 
     #[test]
     fn hints_come_when_they_help_and_never_again() {

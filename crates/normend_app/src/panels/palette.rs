@@ -1,12 +1,14 @@
-//! The command palette: a few letters find every command, recent scan and way of coloring.
+//! The command palette: a few letters find every command, recent scan, way of coloring, theme and size of the interface.
 
 use std::path::PathBuf;
 
 use egui::{Button, Id, Key, Modifiers, RichText, ScrollArea, TextEdit, Ui, Vec2};
 
+use super::preferences::SCALES;
 use super::{Availability, modal};
 use crate::coloring::Coloring;
 use crate::command::{Action, Command};
+use crate::settings::ThemeChoice;
 use crate::theme::{self, SPACE_S, SPACE_XS};
 
 const WIDTH: f32 = 560.0;
@@ -188,7 +190,21 @@ fn entries(ctx: &egui::Context, offers: &Offers<'_>) -> Vec<Entry> {
         action: Action::OpenScan(path.clone()),
         blocked: (offers.availability)(Command::Open).err(),
     });
-    commands.chain(modes).chain(scans).collect()
+    let looks = ThemeChoice::ALL.into_iter().map(|theme| Entry {
+        title: format!("Theme: {}", theme.label()),
+        details: "Light or dark".to_owned(),
+        keys: String::new(),
+        action: Action::Theme(theme),
+        blocked: None,
+    });
+    let sizes = SCALES.into_iter().map(|scale| Entry {
+        title: format!("Interface size: {:.0} %", scale * 100.0),
+        details: "Text, buttons and panels".to_owned(),
+        keys: String::new(),
+        action: Action::InterfaceScale(scale),
+        blocked: None,
+    });
+    commands.chain(modes).chain(looks).chain(sizes).chain(scans).collect()
 }
 
 /// The entries that have the letters, the best first; all of them for no letters, those chosen lately first.
@@ -218,35 +234,45 @@ fn found(text: &str, entries: Vec<Entry>, recent: &[String]) -> Vec<Entry> {
 /// How well `word` is found; in the title better than in the details. `None` when it is in neither.
 fn score(word: &str, title: &str, details: &str) -> Option<u32> {
     let in_title = letters_in_order(word, title).map(|score| 4 * score);
-    // Scattered letters in a long text are chance, so there the word must be whole.
+    let lower = |text: &str| text.to_lowercase().chars().collect();
+    // In a long text runs of letters are chance too, so there a word must begin with all of them.
     let in_details = || {
-        let details = details.to_lowercase();
-        details
-            .contains(&word.to_lowercase())
-            .then_some(2 * word.chars().count() as u32)
+        let (word, details): (Vec<char>, Vec<char>) = (lower(word), lower(details));
+        let is_there = |at: usize| begins_word(&details, at) && details[at..].starts_with(&word);
+        (0..details.len()).any(is_there).then_some(2 * word.len() as u32)
     };
     in_title.or_else(in_details)
 }
 
-/// How well the letters of `word` are found in `text` in their order: more for each that begins a word of the text or
-/// follows the one before it. `None` when one is missing.
+/// How well the letters of `word` are found in `text` in their order: in runs that begin a word of the text or have two letters
+/// or more, since single letters strewn over a text are chance. Long runs and beginnings count more. `None` when there is no such
+/// way. Takes the product of both lengths, times the longest run.
 fn letters_in_order(word: &str, text: &str) -> Option<u32> {
     let word: Vec<char> = word.to_lowercase().chars().collect();
     let text: Vec<char> = text.to_lowercase().chars().collect();
-    let begins = |at: usize| at == 0 || !text[at - 1].is_alphanumeric();
-    // The best of all places for the first letter; after it, each letter is taken where it comes first.
-    let from = |first: usize| {
-        let mut score = 0;
-        let mut last: Option<usize> = None;
-        for &letter in &word {
-            let start = last.map_or(first, |last| last + 1);
-            let at = start + text[start..].iter().position(|&each| each == letter)?;
-            score += 1 + 3 * u32::from(begins(at)) + 2 * u32::from(last.is_some_and(|last| last + 1 == at));
-            last = Some(at);
+    // The best score of the letters from one on in the text from one place on, found from the ends.
+    let mut best = vec![vec![None; text.len() + 1]; word.len() + 1];
+    best[word.len()].fill(Some(0));
+    for letter in (0..word.len()).rev() {
+        for at in (0..text.len()).rev() {
+            let begins = begins_word(&text, at);
+            let longest = std::iter::zip(&word[letter..], &text[at..])
+                .take_while(|(a, b)| a == b)
+                .count();
+            let runs = (1..=longest)
+                .filter(|&length| begins || length > 1)
+                .filter_map(|length| {
+                    let rest: Option<u32> = best[letter + length][at + length];
+                    Some(rest? + 3 * length as u32 - 2 + 3 * u32::from(begins))
+                });
+            best[letter][at] = runs.max().max(best[letter][at + 1]);
         }
-        Some(score)
-    };
-    (0..text.len()).filter_map(from).max()
+    }
+    best[0][0]
+}
+
+fn begins_word(text: &[char], at: usize) -> bool {
+    at == 0 || !text[at - 1].is_alphanumeric()
 }
 
 #[cfg(test)]
@@ -280,15 +306,29 @@ mod tests {
         check("church", "Open church.ply");
         check("ctrl+e", "Export…");
         check("whole region", "Turn whole region here");
+        check("dark", "Theme: Dark");
+        check("size 125", "Interface size: 125 %");
         assert!(titles("qqqq", &[]).is_empty());
+        // No letters strewn over a name.
+        let themes = titles("theme", &[]);
+        assert_eq!(themes.len(), ThemeChoice::ALL.len(), "{themes:?}");
+        assert!(
+            titles("opmple", &[]).contains(&"Open the sample".to_owned()),
+            "runs of letters"
+        );
+        assert!(!titles("onsp", &[]).contains(&"Open the sample".to_owned()));
     }
 
     #[test]
     fn everything_is_offered_and_what_was_chosen_lately_comes_first() {
         let all = titles("", &["About", "FrameAll"]);
         assert_eq!(all[..2], ["About Normend".to_owned(), "Frame all".to_owned()]);
-        // All commands but the palette itself, the other ways of coloring, and the scan.
-        assert_eq!(all.len(), Command::ALL.len() - 1 + Coloring::ALL.len() - 1 + 1);
+        // All commands but the palette itself, the other ways of coloring, how the editor looks, and the scan.
+        let n_looks = ThemeChoice::ALL.len() + SCALES.len();
+        assert_eq!(
+            all.len(),
+            Command::ALL.len() - 1 + Coloring::ALL.len() - 1 + n_looks + 1
+        );
         assert_eq!(all.last().unwrap(), "Undo", "what cannot be done comes last");
     }
 }

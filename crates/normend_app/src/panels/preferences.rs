@@ -357,10 +357,15 @@ fn general(ui: &mut Ui, settings: &mut Settings) {
             .on_hover_text("The view jumps to its place instead of gliding there");
     });
     theme::section(ui, "Hints", |ui| {
-        let any = !settings.dismissed_hints.is_empty();
+        ui.checkbox(&mut settings.shows_hints, "Show hints")
+            .on_hover_text("Small cards in the view that help with the first steps");
+        let any = settings.shows_hints && !settings.dismissed_hints.is_empty();
         let again = ui.add_enabled(any, Button::new(Command::ShowHints.label()));
         let again = again.on_hover_text(Command::ShowHints.tooltip_with_keys(ui.ctx()));
-        if again.on_disabled_hover_text("No hint was dismissed yet").clicked() {
+        if again
+            .on_disabled_hover_text("No hint was dismissed yet, or hints are off")
+            .clicked()
+        {
             settings.dismissed_hints.clear();
         }
     });

@@ -75,8 +75,14 @@ fn switch(ui: &mut Ui, session: &Session) -> Option<Action> {
     let hint = "No viewpoints vote: the present method needs none.";
     ui.add(egui::Label::new(RichText::new(hint).weak()).wrap());
     let button = ui.button("Let viewpoints vote");
-    let button = button
-        .on_hover_text("Orient again with the spanning tree, from sources that viewpoints around the scan vote for");
+    let drops_given = session.document.given_normals().is_some() && session.document.parameters().start == Start::Keep;
+    if drops_given {
+        let cost = "This estimates the normals anew: those of the file are not kept.";
+        ui.add(egui::Label::new(RichText::new(cost).weak()).wrap());
+    }
+    let button = button.on_hover_text(
+        "Estimate the normals anew and orient them with the spanning tree, from sources that viewpoints around the scan vote for",
+    );
     button.clicked().then(|| {
         let wanted = session.document.parameters();
         let tree = if wanted.method == Method::SpanningTree {

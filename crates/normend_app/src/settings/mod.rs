@@ -167,6 +167,8 @@ pub struct Settings {
     pub recent_commands: Vec<String>,
     /// Keys that differ from the table of commands.
     pub keys: Keymap,
+    /// Hints for the first steps come.
+    pub shows_hints: bool,
     /// Names of the hints that were dismissed.
     pub dismissed_hints: BTreeSet<String>,
     /// The file name of the last crash report that the user was told of.
@@ -191,6 +193,7 @@ impl Default for Settings {
             recent: Vec::new(),
             recent_commands: Vec::new(),
             keys: Keymap::default(),
+            shows_hints: true,
             dismissed_hints: BTreeSet::new(),
             told_crash: String::new(),
         }
