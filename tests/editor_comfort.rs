@@ -7,7 +7,7 @@
 mod driver;
 
 use egui::accesskit::Role;
-use egui::{Key, Modifiers};
+use egui::{Key, Modifiers, Vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
 use normend_app::command::Command;
 use normend_app::panels::hints::Card;
@@ -95,6 +95,15 @@ fn the_palette_goes_by_arrows_and_opens_scans_and_modes() {
     editor.wait_until_oriented();
 }
 
+/// Lets more than a minute pass, after which the next hint may come.
+fn wait_for_a_hint(editor: &mut Editor) {
+    let now = editor.harness.ctx.input(|input| input.time);
+    editor.harness.input_mut().time = Some(now + 61.0);
+    editor.harness.step();
+    editor.harness.input_mut().time = None;
+    editor.harness.run_steps(2);
+}
+
 #[test]
 fn hints_come_one_by_one_and_never_again() {
     let prepare = |settings: &mut Settings| settings.dismissed_hints.clear();
@@ -104,11 +113,14 @@ fn hints_come_one_by_one_and_never_again() {
     editor.wait_until_oriented();
     assert!(editor.shows("Look around"));
     editor.click_button("Got it");
+    assert!(!editor.shows("Got it"), "not the next at once");
+    wait_for_a_hint(&mut editor);
     assert!(editor.shows("Mend with a click") && !editor.shows("Look around"));
     assert!(kept(&editor).dismissed_hints.contains(Card::Look.name()));
     // Who mends needs no hint how.
     editor.mend();
     assert!(!editor.shows("Mend with a click"));
+    wait_for_a_hint(&mut editor);
     assert!(editor.shows("finds every command"));
     editor.click_button("Got it");
     assert!(!editor.shows("finds every command"));
@@ -117,6 +129,19 @@ fn hints_come_one_by_one_and_never_again() {
     editor.key(Modifiers::NONE, Key::Enter);
     assert!(editor.shows("Look around"));
     assert!(kept(&editor).dismissed_hints.is_empty());
+    // As high as their words and the button.
+    let title = editor.harness.get_by_label("Look around").rect();
+    let button = editor.harness.get_by_role_and_label(Role::Button, "Got it").rect();
+    assert!(button.bottom() - title.top() < 160.0, "{title:?} to {button:?}");
+    // And not at all when they are off.
+    editor.key(Modifiers::COMMAND, Key::Comma);
+    editor
+        .harness
+        .get_by_role_and_label(Role::CheckBox, "Show hints")
+        .click();
+    editor.harness.run_steps(2);
+    assert!(!editor.shows("Got it"));
+    assert!(!kept(&editor).shows_hints);
 }
 
 #[test]
@@ -254,7 +279,7 @@ fn every_tab_and_window_has_names_at_any_width_of_the_panel() {
         let Some(mut editor) = start_prepared(1.0, prepare, sphere_with_wrong_cap) else {
             return;
         };
-        editor.harness.set_size(egui::Vec2::new(1200.0, 1100.0));
+        editor.harness.set_size(Vec2::new(1200.0, 1100.0));
         editor.wait_until_oriented();
         fill(&mut editor);
         for tab in SideTab::ALL {
@@ -408,6 +433,7 @@ fn further_hints_come_at_their_moment() {
     editor.open_tab(SideTab::Suspects);
     editor.wait("the suspects", |app| app.suspects().unwrap().is_known());
     editor.harness.run_steps(4);
+    wait_for_a_hint(&mut editor);
     assert!(editor.shows("From suspect to suspect"));
     editor.click_button("Got it");
     for _ in 0..2 {
@@ -416,8 +442,10 @@ fn further_hints_come_at_their_moment() {
         editor.harness.state_mut().act(Command::SelectNone.into());
         editor.harness.run_steps(4);
     }
+    wait_for_a_hint(&mut editor);
     assert!(editor.shows("Nothing gets lost"), "edits are journaled");
     editor.click_button("Got it");
+    wait_for_a_hint(&mut editor);
     assert!(editor.shows("Back and forth"));
 }
 
@@ -430,5 +458,59 @@ fn check(editor: &mut Editor, name: &str) {
         picture
             .save(std::path::Path::new(&folder).join(format!("{name}.png")))
             .unwrap();
+    }
+}
+
+#[test]
+fn long_menus_scroll_within_a_small_window() {
+    for size in [Vec2::new(1280.0, 800.0), Vec2::new(600.0, 400.0)] {
+        let Some(mut editor) = start(|_| None) else { return };
+        editor.harness.set_size(size);
+        editor.harness.run_steps(3);
+        for (menu, first, last) in [
+            ("View", "Frame", "Usual interface size"),
+            ("Mend", "Mend tool", "Propagate"),
+        ] {
+            let bar = editor.harness.get_by_role_and_label(Role::Button, menu).rect();
+            editor.click_button(menu);
+            editor.harness.run_steps(3);
+            let place = |editor: &Editor, label: &str| {
+                let entries = editor.harness.query_all_by_role(Role::Button);
+                let entry = entries.rev().find(|entry| {
+                    // The key follows the name.
+                    entry.accesskit_node().label().is_some_and(|of| of.starts_with(label))
+                });
+                entry.unwrap_or_else(|| panic!("no {label}")).rect()
+            };
+            assert!(
+                place(&editor, first).top() >= bar.bottom(),
+                "{menu} covers the bar in {size}"
+            );
+            if let Some(folder) = std::env::var_os("NORMEND_PICTURES") {
+                let image = editor.harness.render().unwrap();
+                let name = format!("menu-{menu}-{}.png", size.x);
+                image.save(std::path::Path::new(&folder).join(name)).unwrap();
+            }
+            // By wheel the last entry comes into the window.
+            editor.hover(place(&editor, first).center());
+            for _ in 0..40 {
+                editor.harness.event(egui::Event::MouseWheel {
+                    unit: egui::MouseWheelUnit::Point,
+                    delta: Vec2::new(0.0, -100.0),
+                    phase: egui::TouchPhase::Move,
+                    source: egui::MouseWheelSource::Unknown,
+                    modifiers: Modifiers::NONE,
+                });
+                editor.harness.run_steps(1);
+            }
+            editor.harness.run_steps(20);
+            let end = place(&editor, last);
+            assert!(
+                end.bottom() <= size.y && end.top() >= bar.bottom(),
+                "{menu} in {size}: {end:?}"
+            );
+            editor.key(Modifiers::NONE, Key::Escape);
+            editor.harness.run_steps(2);
+        }
     }
 }
