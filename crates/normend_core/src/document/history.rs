@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 
-use super::{EditKind, StateChange};
+use super::{EditKind, State, StateChange};
+use crate::Parameters;
 
 /// An applied edit with its inverse. It holds points and directions, no signs and no positions in a tree, so it stays
 /// valid when the propagation changes.
@@ -13,6 +14,28 @@ pub struct Step {
     pub(super) backward: StateChange,
     pub(super) n_turned: u64,
     pub(super) revisions: [Revisions; 2],
+    pub(super) sizes: [SetSizes; 2],
+}
+
+/// How many points are in the sets of a state.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SetSizes {
+    /// Selected points.
+    pub selected: u64,
+    /// Hidden points.
+    pub hidden: u64,
+    /// Accepted points.
+    pub accepted: u64,
+}
+
+impl SetSizes {
+    pub(super) fn of(state: &State) -> Self {
+        Self {
+            selected: state.selected.len(),
+            hidden: state.hidden.len(),
+            accepted: state.accepted.len(),
+        }
+    }
 }
 
 /// The numbers of a state.
@@ -38,6 +61,16 @@ impl Step {
     /// How many points turned when it was first done.
     pub fn n_turned(&self) -> u64 {
         self.n_turned
+    }
+
+    /// The sizes of the sets before it and after it.
+    pub fn sizes(&self) -> [SetSizes; 2] {
+        self.sizes
+    }
+
+    /// The parameters before it and after it, where it changed them.
+    pub fn parameters(&self) -> Option<[Parameters; 2]> {
+        Some([self.backward.parameters?, self.forward.parameters?])
     }
 
     fn bytes(&self) -> usize {
@@ -136,6 +169,7 @@ mod tests {
             forward,
             n_turned: 0,
             revisions: Default::default(),
+            sizes: Default::default(),
         }
     }
 

@@ -43,8 +43,8 @@ mod voted_tests;
 
 pub use components::ComponentSide;
 pub use edit::{Edit, EditError, EditKind, FlipReason};
-pub use history::Step;
 use history::{History, Revisions};
+pub use history::{SetSizes, Step};
 use marks::Overlay;
 pub use marks::{Mark, Marks};
 pub use region_names::{RegionNames, RegionOutline};
@@ -368,6 +368,7 @@ impl Document {
             self.revisions.signs = self.n_revisions;
         }
         self.n_revisions += 1;
+        let sizes_before = SetSizes::of(&self.state);
         let (turned, backward) = make(&mut self.state, self.derived.as_mut(), &mut change, recorded.is_none());
         self.history.record(Step {
             kind,
@@ -375,6 +376,7 @@ impl Document {
             backward,
             n_turned: recorded.unwrap_or_else(|| turned.n_points()),
             revisions: [before, self.revisions],
+            sizes: [sizes_before, SetSizes::of(&self.state)],
         });
         turned
     }
