@@ -100,6 +100,16 @@ fn a_wrong_patch_is_mended_undone_redone_and_exported() {
     let written = normend_io::read(&target, &Silent).unwrap();
     assert_eq!(written.given_normals.unwrap().as_slice(), mended);
     assert!(!editor.app().is_unsaved());
+
+    // As it was opened, nothing is to be lost; the same mend once more is as the file has it.
+    editor.key(Modifiers::COMMAND, Key::Z);
+    assert!(!editor.app().is_unsaved());
+    editor.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+    assert!(!editor.app().is_unsaved());
+    let (place, _) = editor.hover_wrong_patch();
+    editor.click(place);
+    editor.wait("another source", |app| app.document().unwrap().n_done() == 2);
+    assert!(editor.app().is_unsaved());
 }
 
 #[test]

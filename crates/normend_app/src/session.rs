@@ -44,6 +44,8 @@ pub struct Session {
     /// How many of them are left, and the document's revision it was counted at.
     counted_undecided: Cell<Option<(u64, usize)>>,
     saved_revision: u64,
+    /// Of the signs as the scan came in, which need no export.
+    opened_revision: u64,
     /// Clicks, strokes and verbs so far; undo takes none back.
     pub n_interactions: u64,
     /// Points that were selected or deselected, and hidden or shown, since the picture last took them; `None` when the picture
@@ -96,6 +98,7 @@ impl Session {
             undecided: Vec::new(),
             counted_undecided: Cell::new(None),
             saved_revision: document.signs_revision(),
+            opened_revision: document.signs_revision(),
             n_interactions: 0,
             toggled: None,
             turned: Vec::new(),
@@ -120,7 +123,7 @@ impl Session {
 
     /// Whether there are mends, or other parameters than the first, that no exported file has.
     pub fn is_unsaved(&self) -> bool {
-        self.document.signs_revision() != self.saved_revision
+        ![self.saved_revision, self.opened_revision].contains(&self.document.signs_revision())
     }
 
     /// Whether the signs are not those that the state asks for: other parameters, or viewpoints that vote, are wanted than those in
@@ -152,7 +155,7 @@ impl Session {
     /// Remembers that the signs of `revision` are in an exported file.
     pub fn mark_saved(&mut self, revision: u64) {
         self.saved_revision = revision;
-        let is_newest = !self.is_unsaved();
+        let is_newest = self.document.signs_revision() == revision;
         if is_newest {
             self.exported_accepted = self.document.state().accepted.clone();
         }
