@@ -20,11 +20,15 @@ pub fn menus(ui: &mut Ui, availability: &Availability<'_>, recent: &[PathBuf]) -
         for menu in Menu::ALL {
             let button = ui.menu_button(menu.label(), |ui| {
                 ui.set_min_width(232.0);
+                ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
                 // Below the bar, so that the names of the other menus stay in reach; the frame is around it.
                 let frame = egui::Frame::menu(ui.style()).total_margin().sum().y;
                 let room = ui.ctx().content_rect().bottom() - bar_bottom - frame - SPACE_S;
+                let height = room.max(MIN_HEIGHT);
+                // Also where the menu would take less than the window has.
                 ScrollArea::vertical()
-                    .max_height(room.max(MIN_HEIGHT))
+                    .max_height(height)
+                    .min_scrolled_height(height)
                     .show(ui, |ui| entries(ui, menu, availability, recent))
                     .inner
             });
