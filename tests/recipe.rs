@@ -560,14 +560,25 @@ fn confidence_is_exported_when_asked_and_known_and_replayed_the_same() {
     let bytes = fs::read(&exported).unwrap();
     assert!(String::from_utf8_lossy(&bytes).contains("property float confidence\nproperty uchar oriented\n"));
     assert_eq!(
-        normend_io::read(&exported, &Silent).unwrap().given_normals.unwrap().as_slice(),
+        normend_io::read(&exported, &Silent)
+            .unwrap()
+            .given_normals
+            .unwrap()
+            .as_slice(),
         editor.normals()
     );
 
     save_recipe(&mut editor, &folder.join("auto.normend"));
     let output = normend(
         &folder,
-        &["replay", "auto.normend", "sphere.ply", "-o", "replayed.ply", "--confidence"],
+        &[
+            "replay",
+            "auto.normend",
+            "sphere.ply",
+            "-o",
+            "replayed.ply",
+            "--confidence",
+        ],
     );
     assert_eq!(
         output.status.code(),
