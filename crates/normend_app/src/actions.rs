@@ -276,20 +276,6 @@ impl App {
         }
     }
 
-    /// Shows the selected points, or else the selected sources, or else the whole scan.
-    fn frame(&mut self) {
-        let Some(session) = &self.session else { return };
-        let (cloud, points) = (session.document.cloud(), session.document.selected());
-        let place = |point: u32| cloud.positions()[point as usize];
-        if !points.is_empty() {
-            self.viewport.frame_some(points.len(), points.iter().map(place));
-        } else if !session.selected.is_empty() {
-            self.viewport.frame_points(session.selected.iter().copied().map(place));
-        } else {
-            self.viewport.frame_all(cloud);
-        }
-    }
-
     fn scale_splats(&mut self, factor: f32) {
         let scale = &mut self.settings.settings.splat_scale;
         *scale = (*scale * factor).clamp(*SPLAT_SCALES.start(), *SPLAT_SCALES.end());

@@ -221,6 +221,20 @@ impl App {
         }
     }
 
+    /// Shows the selected points, or else the selected sources, or else the whole scan.
+    pub(crate) fn frame(&mut self) {
+        let Some(session) = &self.session else { return };
+        let (cloud, points) = (session.document.cloud(), session.document.selected());
+        let place = |point: u32| cloud.positions()[point as usize];
+        if !points.is_empty() {
+            self.viewport.frame_some(points.len(), points.iter().map(place));
+        } else if !session.selected.is_empty() {
+            self.viewport.frame_points(session.selected.iter().copied().map(place));
+        } else {
+            self.viewport.frame_all(cloud);
+        }
+    }
+
     /// Turns the view around what is at a pixel.
     pub(crate) fn pivot_at(&mut self, pixel: Pixel) {
         if let (Some(scene), Some(session)) = (&self.scene, &self.session) {
