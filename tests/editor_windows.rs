@@ -27,7 +27,7 @@ fn nothing_acts_behind_an_open_question() {
     let place = editor.mend();
     editor.key(Modifiers::COMMAND, Key::A);
     editor.harness.run_steps(20);
-    let (bits, picture) = (editor.bits(), editor.picture());
+    let (bits, camera) = (editor.bits(), *editor.app().camera());
 
     editor.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::O);
     assert!(editor.is_focused(Role::TextInput, "Path of the scan"));
@@ -59,7 +59,7 @@ fn nothing_acts_behind_an_open_question() {
     assert!(!editor.shows("Path of the scan"));
     editor.hover(place);
     editor.harness.run_steps(20);
-    assert_eq!(editor.picture().rgba, picture.rgba, "the view turned behind the window");
+    assert_eq!(editor.app().camera(), &camera, "the view turned behind the window");
     editor.key(Modifiers::NONE, Key::X);
     assert_ne!(editor.bits(), bits, "the keys act again");
 }
