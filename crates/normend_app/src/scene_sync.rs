@@ -319,7 +319,7 @@ impl Scene {
             .set_highlight(&self.state.device, &self.state.queue, ranges);
     }
 
-    /// Shows sources and what else says a side as spheres; see [`SourceSpheres`].
+    /// Shows sources and what else says a side as spheres.
     pub fn show_sources(&mut self, session: &Session) {
         let SourceSpheres { points, spheres, n_own } = SourceSpheres::of(session);
         self.n_own_sources = n_own;

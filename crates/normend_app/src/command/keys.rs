@@ -97,7 +97,7 @@ pub fn is_modifier(key: Key) -> bool {
 }
 
 impl Keymap {
-    /// Makes these the keys that [`Command::keys`] and everything that shows keys in `ctx` use.
+    /// Makes these the keys that [`Keymap::keys`] and everything that shows keys in `ctx` use.
     pub fn install(self, ctx: &egui::Context) {
         ctx.data_mut(|data| data.insert_temp(Id::NULL, Arc::new(self)));
     }
