@@ -736,6 +736,14 @@ fn a_recipe_keeps_the_colors_and_the_reference_in_the_picture() {
     editor.drop_file(&saved);
     wait_for_words(&mut editor, "Applied mine.normend");
     settle(&mut editor);
+    // What is painted is drawn in one of the next frames.
+    for _ in 0..400 {
+        if editor.picture().rgba == mended {
+            break;
+        }
+        editor.harness.step();
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
     assert!(editor.picture().rgba == mended, "the picture is as it was");
     assert_eq!(editor.app().n_interactions(), n_interactions + 1, "a recipe is one");
 }
