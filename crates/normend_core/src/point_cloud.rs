@@ -93,6 +93,18 @@ impl PointCloud {
             || (DVec3::INFINITY, DVec3::NEG_INFINITY),
             |a, b| (a.0.min(b.0), a.1.max(b.1)),
         );
+        let origin = Self::origin_for(min, max)?;
+        Self::new(
+            origin,
+            points.par_iter().map(|&point| (point - origin).as_vec3()).collect(),
+        )
+    }
+
+    /// The origin that [`Self::from_f64`] chooses for points with this bounding box, in the file's coordinates.
+    ///
+    /// # Errors
+    /// [`PointCloudError::Extent`].
+    pub fn origin_for(min: DVec3, max: DVec3) -> Result<DVec3, PointCloudError> {
         let extent = (max - min).length();
         check_extent(extent)?;
         // The largest power of two up to the extent: its exponent, without the mantissa.
@@ -107,15 +119,11 @@ impl PointCloud {
                 (middle / step).round() * step
             }
         };
-        let origin = DVec3::new(
+        Ok(DVec3::new(
             origin_on_axis(min.x, max.x),
             origin_on_axis(min.y, max.y),
             origin_on_axis(min.z, max.z),
-        );
-        Self::new(
-            origin,
-            points.par_iter().map(|&point| (point - origin).as_vec3()).collect(),
-        )
+        ))
     }
 
     /// Number of points.
