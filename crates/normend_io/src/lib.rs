@@ -44,7 +44,7 @@ use normend_core::{PointCloud, Progress};
 use rayon::prelude::*;
 
 pub use error::{Broken, Place, ReadError, WriteError};
-pub use stations::read_stations;
+pub use stations::{read_stations, stations_of_bytes};
 
 use crate::new_file::{NewFile, TextStyle, narrowest};
 use crate::ply::PlyLayout;

@@ -22,10 +22,18 @@ const COLUMNS: [&str; 5] = ["first", "count", "x", "y", "z"];
 /// [`ReadError`]; its message names the file, the line, the reason and what to do.
 pub fn read_stations(path: &Path, scan: &Scan) -> Result<Vec<Station>, ReadError> {
     let bytes = read_file(path, &Silent)?;
+    stations_of_bytes(&bytes, &path.display().to_string(), scan)
+}
+
+/// Reads the places from memory; `name` stands for the file in messages.
+///
+/// # Errors
+/// As [`read_stations`].
+pub fn stations_of_bytes(bytes: &[u8], name: &str, scan: &Scan) -> Result<Vec<Station>, ReadError> {
     let n_rows = scan.cloud.n_points() + scan.n_left_out;
     let rows = scan.rows.as_ref().map(|rows| rows.as_slice());
-    parse(&bytes, n_rows, rows).map_err(|broken| ReadError::Broken {
-        name: path.display().to_string(),
+    parse(bytes, n_rows, rows).map_err(|broken| ReadError::Broken {
+        name: name.to_owned(),
         broken,
     })
 }
