@@ -1,6 +1,10 @@
 //! The k nearest points of each point, in one flat array.
 //!
-//! Invariants: rows are exact and complete in the order (distance, id), with distances as `f64` sees the `f32`
+//! Points in one place are one neighbor: a row names the first point of each of the nearest places, so that copies neither fill rows
+//! nor tear a surface apart, and a copy's row begins with the first point of its own place. More of a place are named only where
+//! there are too few places.
+//!
+//! Invariants: rows are exact and complete in the order (distance, id), with distances as `f64` sees the
 //! positions; so equal distances, points in one place, lines and planes have one right answer. Rows do not depend on
 //! the number of threads.
 
@@ -15,7 +19,8 @@ use rayon::prelude::*;
 use crate::progress::{Part, Steps};
 use crate::{Cancelled, PointCloud, Progress};
 
-/// The k-neighborhood of every point: `n × k` ids, each row ascending by distance, ties by id, never the point itself.
+/// The k-neighborhood of every point: `n × k` ids, each row ascending by distance, ties by id, never the point itself, of points in
+/// one place only the first.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Neighbors {
     k: usize,
@@ -174,7 +179,8 @@ struct Search<'a> {
     k: usize,
     /// Squared distance and index of the places near the one searched around.
     near: Vec<(f64, u32)>,
-    /// The nearest points, ascending by (distance, id), the searching points among them: `k + 1` or more.
+    /// The first points of the nearest places, ascending by (distance, id), those searched around among them: `k + 1` or more. Others
+    /// follow where there are not so many places.
     found: Vec<Found>,
 }
 
@@ -233,32 +239,35 @@ impl<'a> Search<'a> {
             .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     }
 
-    /// The squared distance within which `k + 1` points are, the searching one among them.
+    /// The squared distance within which `k + 1` places are, the one searched around among them.
     fn needed_distance(&self) -> f64 {
-        let mut n_points = 0;
-        for &(squared_distance, place) in &self.near {
-            n_points += self.places.members(place as usize).len();
-            if n_points > self.k {
-                return squared_distance;
-            }
-        }
-        self.near.last().map_or(0.0, |last| last.0)
+        let needed = self.near.get(self.k).or(self.near.last());
+        needed.map_or(0.0, |needed| needed.0)
     }
 
-    /// Fills `found` with the points of `near` up to `needed`. Of each place the first `k + 1` are enough.
+    /// Fills `found` with the first points of the places of `near` up to `needed`, and with others where that is not enough: of each
+    /// place the first `k + 1` are enough then.
     fn take_points(&mut self, needed: f64) {
-        self.found.clear();
-        for &(squared_distance, place) in self.near.iter().take_while(|near| near.0 <= needed) {
-            let members = self.places.members(place as usize);
-            self.found.extend(
-                members
-                    .iter()
-                    .take(self.k + 1)
-                    .map(|&id| Found { squared_distance, id }),
-            );
+        let by_distance =
+            |a: &Found, b: &Found| a.squared_distance.total_cmp(&b.squared_distance).then(a.id.cmp(&b.id));
+        let Self {
+            places, near, found, k, ..
+        } = self;
+        let near = || near.iter().take_while(|near| near.0 <= needed);
+        let member = |squared_distance| move |&id: &u32| Found { squared_distance, id };
+        found.clear();
+        for &(squared_distance, place) in near() {
+            found.extend(places.members(place as usize).first().map(member(squared_distance)));
         }
-        self.found
-            .sort_unstable_by(|a, b| a.squared_distance.total_cmp(&b.squared_distance).then(a.id.cmp(&b.id)));
+        found.sort_unstable_by(by_distance);
+        let n_places = found.len();
+        if n_places <= *k {
+            for &(squared_distance, place) in near() {
+                let members = places.members(place as usize).iter();
+                found.extend(members.skip(1).take(*k).map(member(squared_distance)));
+            }
+            found[n_places..].sort_unstable_by(by_distance);
+        }
     }
 }
 
@@ -325,7 +334,16 @@ mod tests {
         for (point, position) in positions.iter().enumerate() {
             let mut others: Vec<usize> = (0..positions.len()).filter(|&other| other != point).collect();
             let distance = |other: usize| (positions[other].as_dvec3() - position.as_dvec3()).length_squared();
-            others.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+            // Of each place the first point, before any other.
+            let is_copy = |other: usize| positions[..other].contains(&positions[other]);
+            let order = |other: usize| (is_copy(other), distance(other));
+            others.sort_by(|&a, &b| {
+                order(a)
+                    .0
+                    .cmp(&order(b).0)
+                    .then(order(a).1.total_cmp(&order(b).1))
+                    .then(a.cmp(&b))
+            });
             ids.extend(others[..k].iter().map(|&other| other as u32));
         }
         Neighbors { k, ids }
