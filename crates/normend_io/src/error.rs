@@ -91,6 +91,18 @@ pub enum WriteError {
         /// What the system said.
         source: io::Error,
     },
+    /// There is no room for the file.
+    #[error(
+        "{} cannot be written: the disk is full, there was room for only {} of it; free some space there, or choose another disk",
+        path.display(),
+        size_in_words(*n_bytes)
+    )]
+    Full {
+        /// The target.
+        path: PathBuf,
+        /// Bytes that there was room for.
+        n_bytes: u64,
+    },
     /// The bytes that were read no longer make sense.
     #[error("the file that was read cannot be copied: {0}")]
     Source(Broken),
@@ -205,13 +217,41 @@ fn written() -> String {
     dotted.join(" ")
 }
 
+/// What to say of a drive that does not answer any more.
+const DRIVE_IS_GONE: &str = "its drive does not answer: connect it again and try once more";
+
 fn io_words(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "there is no such file or folder: check the path".to_owned(),
         io::ErrorKind::PermissionDenied => "the system forbids it: check the permissions".to_owned(),
         io::ErrorKind::IsADirectory => "this is a folder: name a file".to_owned(),
-        io::ErrorKind::StorageFull => "the disk is full: free some space and try again".to_owned(),
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            "the disk is full: free some space and try again".to_owned()
+        }
+        io::ErrorKind::ReadOnlyFilesystem => "the disk is read-only: choose a place on another one".to_owned(),
+        io::ErrorKind::InvalidFilename => {
+            "the name is too long, or has signs that this disk cannot hold: shorten it".to_owned()
+        }
+        io::ErrorKind::NotADirectory => "a file stands where a folder should: check the path".to_owned(),
+        io::ErrorKind::FileTooLarge => "this disk holds no file that large: choose another one".to_owned(),
+        io::ErrorKind::StaleNetworkFileHandle
+        | io::ErrorKind::NetworkDown
+        | io::ErrorKind::HostUnreachable
+        | io::ErrorKind::NotConnected
+        | io::ErrorKind::TimedOut => DRIVE_IS_GONE.to_owned(),
+        // EIO, ENXIO and ENODEV, of a drive that was pulled out; these are their numbers on Linux, macOS and the BSDs.
+        _ if cfg!(unix) && matches!(error.raw_os_error(), Some(5 | 6 | 19)) => DRIVE_IS_GONE.to_owned(),
         io::ErrorKind::OutOfMemory => "it does not fit into memory: split the scan".to_owned(),
         _ => error.to_string(),
+    }
+}
+
+/// A number of bytes in words, as disks are sold: `12.3 MB`.
+fn size_in_words(n_bytes: u64) -> String {
+    match n_bytes {
+        0..1000 => format!("{n_bytes} bytes"),
+        1000..1_000_000 => format!("{:.1} kB", n_bytes as f64 / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", n_bytes as f64 / 1e6),
+        _ => format!("{:.1} GB", n_bytes as f64 / 1e9),
     }
 }

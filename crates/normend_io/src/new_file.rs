@@ -1,159 +1,440 @@
-//! Files of points that are not a copy of the file that came in.
+//! Files of points that are not a copy of the file that came in: fresh clouds, and scans in another format.
+//!
+//! A format writes what it can hold of a [`NewFile`], row by row, and names what it cannot ([`Loss`]).
 
-use std::path::Path;
+use std::fmt;
+use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 use normend_core::Progress;
 use rayon::prelude::*;
 
-use crate::error::WriteError;
-use crate::ply;
-use crate::rewrite::{NO_NORMAL, RowNormals, push_normal};
-use crate::table::{PART_ROWS, VALUE_NAMES, for_each_part};
+use crate::columns::{Column, ColumnKind};
+use crate::error::{Broken, Stop, WriteError, quoted};
+use crate::output::Output;
+use crate::rewrite::{NO_NORMAL, RowNormals};
+use crate::table::{
+    COORDINATES, Frame, Layout, MOST_COLUMNS, NORMAL, PART_ROWS, Rows, SIDE, Span, VALUE_NAMES, for_each_part,
+};
 use crate::value::{Scalar, ValueType, push_number};
 
-/// How a text is laid out that is no copy of a text, by what programs expect of its extension.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum TextStyle {
-    /// `.xyz` and the like: values with spaces between them, nothing else.
-    Plain,
-    /// `.pts`: the number of points first.
-    Pts,
-    /// `.csv`: the names of the columns first, and commas.
-    Csv,
+/// Something that a file of another format cannot hold.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Loss {
+    /// What is lost ("12 rows of element \"face\"").
+    pub what: String,
+    /// Why ("PCD holds points only").
+    pub why: String,
 }
 
-impl TextStyle {
-    pub fn of_path(path: &Path) -> Self {
-        let has = |name: &str| {
-            path.extension()
-                .is_some_and(|extension| extension.eq_ignore_ascii_case(name))
-        };
-        if has("csv") {
-            Self::Csv
-        } else if has("pts") {
-            Self::Pts
-        } else {
-            Self::Plain
+impl fmt::Display for Loss {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.what, self.why)
+    }
+}
+
+/// A value that the rows of a new file have besides position, normal and confidence.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Field {
+    /// As the source calls it.
+    pub name: String,
+    pub kind: ColumnKind,
+    /// Which column of the source it is.
+    column: usize,
+}
+
+/// A value of a row, as the source has it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cell<'a> {
+    pub bytes: &'a [u8],
+    pub value_type: ValueType,
+}
+
+impl Cell<'_> {
+    /// The number, NaN where the source has none: an empty cell, a word.
+    pub fn number(&self) -> f64 {
+        self.value_type.read(self.bytes).unwrap_or(f64::NAN)
+    }
+
+    /// Appends it as text: a text's as it is, a number as short as it reads back.
+    pub fn push_text(&self, out: &mut Vec<u8>) {
+        match self.value_type {
+            ValueType::Text => out.extend_from_slice(self.bytes),
+            binary => match binary.read_long(self.bytes) {
+                Some(long) => out.extend_from_slice(long.to_string().as_bytes()),
+                None => push_number(self.number(), binary.scalar() == Some(Scalar::Float), out),
+            },
         }
     }
 
-    pub fn separator(self) -> u8 {
-        if self == Self::Csv { b',' } else { b' ' }
-    }
-
-    /// What stands before the rows.
-    pub fn head(self, n_rows: usize, has_normals: bool) -> String {
-        match self {
-            Self::Plain => String::new(),
-            Self::Pts => format!("{n_rows}\n"),
-            Self::Csv => VALUE_NAMES[..if has_normals { 6 } else { 3 }].join(",") + "\n",
+    /// Appends it as a little-endian number of a type that holds it: what does not fit is the nearest that does, what is no
+    /// number 0 in a type of whole numbers.
+    pub fn push_binary(&self, scalar: Scalar, out: &mut Vec<u8>) {
+        match (self.value_type, scalar) {
+            // The same bits, also of a NaN, and of whole numbers that `f64` would round.
+            (ValueType::LittleEndian(own), _) if own == scalar => out.extend_from_slice(self.bytes),
+            (ValueType::BigEndian(own), _) if own == scalar => out.extend(self.bytes.iter().rev()),
+            _ => {
+                let value = self.number();
+                match scalar {
+                    Scalar::Char => out.extend((value.round() as i8).to_le_bytes()),
+                    Scalar::UChar => out.extend((value.round() as u8).to_le_bytes()),
+                    Scalar::Short => out.extend((value.round() as i16).to_le_bytes()),
+                    Scalar::UShort => out.extend((value.round() as u16).to_le_bytes()),
+                    Scalar::Int => out.extend((value.round() as i32).to_le_bytes()),
+                    Scalar::UInt => out.extend((value.round() as u32).to_le_bytes()),
+                    Scalar::Long => out.extend((value.round() as i64).to_le_bytes()),
+                    Scalar::ULong => out.extend((value.round() as u64).to_le_bytes()),
+                    Scalar::Float => out.extend((value as f32).to_le_bytes()),
+                    Scalar::Double => out.extend(value.to_le_bytes()),
+                }
+            }
         }
     }
+}
+
+/// A row of a new file.
+pub(crate) struct NewRow<'a> {
+    /// In the scan's coordinates; not finite for a row that is no point.
+    pub position: DVec3,
+    /// The coordinates as the source has them, when these are the scan's.
+    pub coordinates: Option<[Cell<'a>; 3]>,
+    /// Unit; `None` when no normals are written.
+    pub normal: Option<Vec3>,
+    /// In units of 1/255; `None` when it is not written.
+    pub confidence: Option<u8>,
+    /// The values of the fields, in their order.
+    pub cells: &'a [Cell<'a>],
+}
+
+impl NewRow<'_> {
+    /// Appends the coordinates as text, as they are or as short as they read back, with `separator` between them.
+    pub fn push_coordinates(&self, coordinates: Scalar, separator: u8, out: &mut Vec<u8>) {
+        for axis in 0..3 {
+            if axis > 0 {
+                out.push(separator);
+            }
+            match &self.coordinates {
+                Some(cells) => cells[axis].push_text(out),
+                None => push_number(self.position[axis], coordinates == Scalar::Float, out),
+            }
+        }
+    }
+}
+
+/// Where the positions of a new file come from.
+pub(crate) enum Origin<'a> {
+    /// A fresh cloud.
+    Positions(&'a (dyn Fn(usize) -> DVec3 + Sync)),
+    /// Another file.
+    File { layout: &'a dyn Layout, bytes: &'a [u8] },
 }
 
 /// Points to be written, in order.
 pub(crate) struct NewFile<'a> {
-    pub n_points: usize,
-    pub position: &'a (dyn Fn(usize) -> DVec3 + Sync),
-    /// [`Scalar::Float`] or [`Scalar::Double`].
+    pub n_rows: usize,
+    pub origin: Origin<'a>,
+    /// [`Scalar::Float`] when the coordinates lose nothing by it, else [`Scalar::Double`].
     pub coordinates: Scalar,
     pub normals: Option<RowNormals<'a>>,
+    /// What else there is; a format drops what it cannot hold before it writes ([`Self::drop_fields`]).
+    pub fields: Vec<Field>,
+    /// One line that names program, version and rule.
     pub comment: Option<&'a str>,
 }
 
-impl NewFile<'_> {
-    /// Writes binary little-endian PLY.
-    pub fn write_ply(
-        &self,
-        write: &mut dyn FnMut(&[u8]) -> Result<(), WriteError>,
-        progress: &dyn Progress,
-    ) -> Result<(), WriteError> {
-        let has_normals = self.normals.is_some();
-        write(ply::new_header(self.n_points, self.coordinates, has_normals, self.comment).as_bytes())?;
-        self.write_rows(
-            |position, normal, out| {
-                for coordinate in position.to_array() {
-                    match self.coordinates {
-                        Scalar::Double => out.extend_from_slice(&coordinate.to_le_bytes()),
-                        _ => out.extend_from_slice(&(coordinate as f32).to_le_bytes()),
-                    }
-                }
-                for component in normal.iter().flat_map(Vec3::to_array) {
-                    ValueType::LittleEndian(Scalar::Float).write(component, out);
-                }
+impl<'a> NewFile<'a> {
+    /// All that another file holds.
+    pub fn of_file(layout: &'a dyn Layout, bytes: &'a [u8], normals: Option<RowNormals<'a>>) -> Self {
+        let table = layout.table();
+        let has_confidence = normals.is_some_and(RowNormals::has_confidence);
+        // The columns that are written as position, normal and confidence are found by asking for the values of a row.
+        let own = layout.columns(bytes).into_iter().filter(|column| {
+            let written = if has_confidence {
+                COORDINATES.start..SIDE.end
+            } else {
+                COORDINATES.start..NORMAL.end
+            };
+            !written
+                .into_iter()
+                .any(|slot| layout.column_of(slot) == Some(column.index))
+        });
+        Self {
+            n_rows: table.n_rows,
+            origin: Origin::File { layout, bytes },
+            coordinates: match table.types[0].scalar() {
+                Some(scalar) if table.frames.is_empty() && scalar != Scalar::Double => scalar,
+                _ => Scalar::Double,
             },
-            write,
-            progress,
-        )
+            normals,
+            fields: own
+                .map(|Column { name, index, kind }| Field {
+                    name,
+                    kind,
+                    column: index,
+                })
+                .collect(),
+            comment: None,
+        }
     }
 
-    /// Writes text, a point a line: `x y z [nx ny nz]`.
-    pub fn write_text(
-        &self,
-        style: TextStyle,
-        write: &mut dyn FnMut(&[u8]) -> Result<(), WriteError>,
-        progress: &dyn Progress,
-    ) -> Result<(), WriteError> {
-        let separator = style.separator();
-        write(style.head(self.n_points, self.normals.is_some()).as_bytes())?;
-        self.write_rows(
-            |position, normal, out| {
-                for (axis, coordinate) in position.to_array().into_iter().enumerate() {
-                    if axis > 0 {
-                        out.push(separator);
-                    }
-                    push_number(coordinate, self.coordinates == Scalar::Float, out);
-                }
-                if let Some(normal) = normal {
-                    push_normal(normal, separator, out);
-                }
-                out.push(b'\n');
-            },
-            write,
-            progress,
-        )
+    /// The frames of the source's rows; empty when its coordinates are stored as they are.
+    pub fn frames(&self) -> &[Frame] {
+        match self.origin {
+            Origin::Positions(_) => &[],
+            Origin::File { layout, .. } => &layout.table().frames,
+        }
     }
 
-    fn write_rows(
-        &self,
-        push_row: impl Fn(DVec3, Option<Vec3>, &mut Vec<u8>) + Sync,
-        write: &mut dyn FnMut(&[u8]) -> Result<(), WriteError>,
-        progress: &dyn Progress,
-    ) -> Result<(), WriteError> {
-        let make = |index: usize, out: &mut Vec<u8>| -> Result<(), WriteError> {
-            let rows = index * PART_ROWS..((index + 1) * PART_ROWS).min(self.n_points);
-            let mut normals = self.normals.map(|normals| normals.since_row(rows.start));
-            for row in rows {
-                let normal = normals
-                    .as_mut()
-                    .map(|normals| normals.next().flatten().unwrap_or(NO_NORMAL));
-                push_row((self.position)(row), normal, out);
+    /// Whether confidence is written.
+    pub fn has_confidence(&self) -> bool {
+        self.normals.is_some_and(RowNormals::has_confidence)
+    }
+
+    /// Drops the fields that `why_not` gives a reason for, and returns them as losses.
+    pub fn drop_fields(&mut self, why_not: impl Fn(&Field) -> Option<String>) -> Vec<Loss> {
+        let mut losses = Vec::new();
+        self.fields.retain(|field| match why_not(field) {
+            None => true,
+            Some(why) => {
+                losses.push(Loss {
+                    what: format!("\"{}\"", field.name),
+                    why,
+                });
+                false
             }
-            Ok(())
+        });
+        losses
+    }
+
+    /// Finds the narrowest binary types for what has none: coordinates of texts and of frames, fields of decimals. Goes over
+    /// all rows once.
+    pub fn narrow(&mut self, progress: &dyn Progress) -> Result<(), Stop> {
+        let is_needed = self.coordinates == Scalar::Double && matches!(self.origin, Origin::File { .. });
+        if !is_needed && self.fields.iter().all(|field| field.kind != ColumnKind::Decimal) {
+            return Ok(());
+        }
+        let n_parts = self.n_rows.div_ceil(PART_ROWS);
+        let ranges: Vec<Result<Vec<Kinds>, Stop>> = (0..n_parts)
+            .into_par_iter()
+            .map(|index| {
+                progress.report(index as f32 / n_parts as f32)?;
+                let mut kinds = vec![Kinds::NONE; 1 + self.fields.len()];
+                self.for_rows(self.rows_of_part(index), |row| {
+                    row.position
+                        .to_array()
+                        .into_iter()
+                        .for_each(|value| kinds[0].add(value));
+                    for (kind, cell) in kinds[1..].iter_mut().zip(row.cells) {
+                        if cell.value_type == ValueType::Text {
+                            kind.add(cell.number());
+                        }
+                    }
+                })?;
+                Ok(kinds)
+            })
+            .collect();
+        let mut kinds = vec![Kinds::NONE; 1 + self.fields.len()];
+        for part in ranges {
+            for (kind, other) in kinds.iter_mut().zip(part?) {
+                kind.join(other);
+            }
+        }
+        if is_needed && kinds[0].survives_float {
+            self.coordinates = Scalar::Float;
+        }
+        for (field, kind) in self.fields.iter_mut().zip(&kinds[1..]) {
+            if field.kind == ColumnKind::Decimal {
+                field.kind = ColumnKind::Number(kind.narrowest());
+            }
+        }
+        Ok(())
+    }
+
+    /// The rows of a part, the unit of parallel work.
+    fn rows_of_part(&self, index: usize) -> Range<usize> {
+        index * PART_ROWS..((index + 1) * PART_ROWS).min(self.n_rows)
+    }
+
+    /// Makes the bytes of all rows in parallel and writes them in order.
+    pub fn write_rows(
+        &self,
+        push_row: impl Fn(&NewRow<'_>, &mut Vec<u8>) + Sync,
+        out: &mut Output<'_>,
+        progress: &dyn Progress,
+    ) -> Result<(), WriteError> {
+        for_each_part(
+            self.n_rows.div_ceil(PART_ROWS),
+            progress,
+            |index, out| -> Result<(), WriteError> {
+                Ok(self.for_rows(self.rows_of_part(index), |row| push_row(row, out))?)
+            },
+            |part| out.write(part),
+        )
+    }
+
+    /// Hands some rows to `take`, in order; the first of them begins a part ([`PART_ROWS`]).
+    pub fn for_rows(&self, range: Range<usize>, mut take: impl FnMut(&NewRow<'_>)) -> Result<(), Stop> {
+        let points = self.normals.map(|normals| normals.points_since_row(range.start));
+        let mut points = points.into_iter().flatten();
+        let mut normal_of_row = || {
+            let normals = self.normals?;
+            let point = points.next().flatten();
+            let confidence = match point {
+                Some(point) => normals.confidence_of(point),
+                // A row that is no point is not sure of anything.
+                None => normals.has_confidence().then_some(0),
+            };
+            Some((point.map_or(NO_NORMAL, |point| normals.normal_of(point)), confidence))
         };
-        for_each_part(self.n_points.div_ceil(PART_ROWS), progress, make, write)
+        match self.origin {
+            Origin::Positions(position) => {
+                for row in range {
+                    let (normal, confidence) = normal_of_row().unzip();
+                    take(&NewRow {
+                        position: position(row),
+                        coordinates: None,
+                        normal,
+                        confidence: confidence.flatten(),
+                        cells: &[],
+                    });
+                }
+                Ok(())
+            }
+            Origin::File { layout, bytes } => {
+                let table = layout.table();
+                let start = table.part(range.start / PART_ROWS).bytes.start;
+                // Rows give a few values at a time, so as many iterators go in step as all fields need.
+                let columns: Vec<usize> = self.fields.iter().map(|field| field.column).collect();
+                let groups: Vec<(Box<dyn Layout>, Vec<usize>)> = columns
+                    .chunks(MOST_COLUMNS)
+                    .map(|group| layout.with_columns(group))
+                    .collect();
+                let mut own = layout.rows(bytes, start);
+                let mut others: Vec<Box<dyn Rows + '_>> =
+                    groups.iter().map(|(layout, _)| layout.rows(bytes, start)).collect();
+                let mut frames = table.frames_since_row(range.start);
+                let mut cells = Vec::with_capacity(columns.len());
+                for _ in range {
+                    let Some(spans) = own.next_row()? else {
+                        break;
+                    };
+                    let cell = |span: Span, value_type: ValueType| Cell {
+                        bytes: span.of(bytes),
+                        value_type,
+                    };
+                    let coordinates: [Cell<'_>; 3] = std::array::from_fn(|axis| cell(spans[axis], table.types[axis]));
+                    let mut stored = DVec3::ZERO;
+                    for axis in COORDINATES {
+                        stored[axis] = table.types[axis].read(coordinates[axis].bytes).ok_or_else(|| {
+                            Broken::new(
+                                layout.place(bytes, spans[axis].start),
+                                format!(
+                                    "{} is {}, which is not a number",
+                                    VALUE_NAMES[axis],
+                                    quoted(coordinates[axis].bytes)
+                                ),
+                            )
+                        })?;
+                    }
+                    cells.clear();
+                    for ((layout, slots), rows) in groups.iter().zip(&mut others) {
+                        let Some(spans) = rows.next_row()? else {
+                            break;
+                        };
+                        cells.extend(slots.iter().map(|&slot| cell(spans[slot], layout.table().types[slot])));
+                    }
+                    let frame = frames.next().flatten();
+                    let (normal, confidence) = normal_of_row().unzip();
+                    take(&NewRow {
+                        position: frame.map_or(stored, |frame| frame.from_stored.transform_point3(stored)),
+                        coordinates: frame.is_none().then_some(coordinates),
+                        normal,
+                        confidence: confidence.flatten(),
+                        cells: &cells,
+                    });
+                }
+                Ok(())
+            }
+        }
     }
 }
 
-/// `float` when the coordinates lose nothing by it: their shortest decimals are the same in `f32` and in `f64`. Else
-/// `double`.
-pub(crate) fn narrowest(positions: &[DVec3]) -> Scalar {
-    let survives = |coordinate: f64| {
-        let narrow = coordinate as f32;
-        // Most coordinates of texts have few decimals; only those that `f32` rounds need a look at the decimals.
-        f64::from(narrow) == coordinate || !coordinate.is_finite() || {
-            let mut decimal = Vec::new();
-            push_number(f64::from(narrow), true, &mut decimal);
-            crate::value::parse(&decimal) == Some(coordinate)
-        }
+/// What some decimals have in common.
+#[derive(Clone, Copy)]
+struct Kinds {
+    are_whole: bool,
+    /// Whether their shortest decimals are the same in `f32` and in `f64`.
+    survives_float: bool,
+    min: f64,
+    max: f64,
+}
+
+impl Kinds {
+    const NONE: Self = Self {
+        are_whole: true,
+        survives_float: true,
+        min: f64::INFINITY,
+        max: f64::NEG_INFINITY,
     };
-    if positions
-        .par_iter()
-        .all(|position| position.to_array().into_iter().all(survives))
-    {
-        Scalar::Float
-    } else {
-        Scalar::Double
+
+    fn add(&mut self, value: f64) {
+        self.are_whole &= value.fract() == 0.0 && !(value == 0.0 && value.is_sign_negative());
+        self.survives_float = self.survives_float && survives_float(value);
+        self.min = self.min.min(value);
+        self.max = self.max.max(value);
     }
+
+    fn join(&mut self, other: Self) {
+        self.are_whole &= other.are_whole;
+        self.survives_float &= other.survives_float;
+        self.min = self.min.min(other.min);
+        self.max = self.max.max(other.max);
+    }
+
+    fn narrowest(&self) -> Scalar {
+        let fits = |min: f64, max: f64| self.are_whole && min <= self.min && self.max <= max;
+        if fits(0.0, f64::from(u8::MAX)) {
+            Scalar::UChar
+        } else if fits(0.0, f64::from(u16::MAX)) {
+            Scalar::UShort
+        } else if fits(f64::from(i32::MIN), f64::from(i32::MAX)) {
+            Scalar::Int
+        } else if fits(0.0, f64::from(u32::MAX)) {
+            Scalar::UInt
+        } else if self.survives_float {
+            Scalar::Float
+        } else {
+            Scalar::Double
+        }
+    }
+}
+
+/// Whether a number's shortest decimal is the same in `f32` and in `f64`.
+fn survives_float(value: f64) -> bool {
+    let narrow = value as f32;
+    // Most numbers of texts have few decimals; only those that `f32` rounds need a look at the decimals.
+    f64::from(narrow) == value || !value.is_finite() || {
+        let mut decimal = Vec::new();
+        push_number(f64::from(narrow), true, &mut decimal);
+        crate::value::parse(&decimal) == Some(value)
+    }
+}
+
+/// Names for fields in a format that allows letters, digits and `_` only: others become `_`, and a name that is there already
+/// gets a number. `taken` are names that the format uses itself.
+pub(crate) fn plain_names(fields: &[Field], taken: &[&str]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for field in fields {
+        let plain = |letter: char| if letter.is_ascii_alphanumeric() { letter } else { '_' };
+        let base: String = field.name.chars().map(plain).collect();
+        let mut name = base.clone();
+        let mut number = 2;
+        while name.is_empty() || taken.contains(&name.as_str()) || names.contains(&name) {
+            name = format!("{base}_{number}");
+            number += 1;
+        }
+        names.push(name);
+    }
+    names
 }

@@ -1,13 +1,13 @@
-//! Writing rows: the file that came in with other normals, or its points in another format.
+//! Writing the rows of the file that came in, with other normals.
 
 use glam::Vec3;
 use normend_core::Progress;
 use normend_core::confidence::UNDECIDED;
 
 use crate::error::{Stop, WriteError};
-use crate::new_file::TextStyle;
+use crate::output::Output;
 use crate::table::{Layout, N_VALUES, NORMAL, Part, SIDE, Span, Spans, for_each_part};
-use crate::value::{Scalar, ValueType, push_number};
+use crate::value::{Scalar, ValueType};
 
 /// What a row gets that is no point, because a coordinate is not finite, where the file has no normal to keep.
 pub(crate) const NO_NORMAL: Vec3 = Vec3::Z;
@@ -31,14 +31,23 @@ impl<'a> RowNormals<'a> {
         }
     }
 
-    /// The normals of the rows from `first_row` on, without end; `None` for a row that is no point.
-    pub fn since_row(self, first_row: usize) -> impl Iterator<Item = Option<Vec3>> + 'a {
-        let points = self.points_since_row(first_row);
-        points.map(move |point| self.normals.get(point?).copied())
+    /// Whether confidence is written.
+    pub fn has_confidence(self) -> bool {
+        self.confidence.is_some()
+    }
+
+    /// How sure the normal of a point is of its side, in units of 1/255; `None` when it is not written.
+    pub fn confidence_of(self, point: usize) -> Option<u8> {
+        self.confidence.map(|confidence| confidence[point])
+    }
+
+    /// The normal of a point, unit.
+    pub fn normal_of(self, point: usize) -> Vec3 {
+        self.normals[point]
     }
 
     /// The points of the rows from `first_row` on, without end; `None` for a row that is no point.
-    fn points_since_row(self, first_row: usize) -> impl Iterator<Item = Option<usize>> + 'a {
+    pub fn points_since_row(self, first_row: usize) -> impl Iterator<Item = Option<usize>> + 'a {
         let mut point = self.rows.map_or(first_row, |rows| {
             rows.partition_point(|row| (*row as usize) < first_row)
         });
@@ -61,24 +70,24 @@ pub(crate) fn rewrite(
     bytes: &[u8],
     edits: &[(Span, Vec<u8>)],
     normals: RowNormals<'_>,
-    write: &mut dyn FnMut(&[u8]) -> Result<(), WriteError>,
+    out: &mut Output<'_>,
     progress: &dyn Progress,
 ) -> Result<(), WriteError> {
     let table = layout.table();
     let mut done = 0;
     for (span, replacement) in edits {
-        write(&bytes[done..span.start])?;
-        write(replacement)?;
+        out.write(&bytes[done..span.start])?;
+        out.write(replacement)?;
         done = span.end;
     }
-    write(&bytes[done..table.start()])?;
+    out.write(&bytes[done..table.start()])?;
     for_each_part(
         table.n_parts(),
         progress,
         |index, out| Ok(rewrite_part(layout, bytes, table.part(index), normals, out)?),
-        &mut *write,
+        |part| out.write(part),
     )?;
-    write(&bytes[table.end..])
+    out.write(&bytes[table.end..])
 }
 
 fn rewrite_part(
@@ -92,11 +101,13 @@ fn rewrite_part(
     let mut rows = layout.rows(bytes, part.bytes.start);
     let mut done = part.bytes.start;
     let anchor = table.anchor();
-    for point in normals.points_since_row(part.first_row).take(part.n_rows) {
+    let frames = table.frames_since_row(part.first_row);
+    for (point, frame) in normals.points_since_row(part.first_row).zip(frames).take(part.n_rows) {
         let Some(spans) = rows.next_row()? else {
             break;
         };
-        let normal = point.and_then(|point| normals.normals.get(point).copied());
+        let normal = point.map(|point| normals.normals[point]);
+        let normal = normal.map(|normal| frame.map_or(normal, |frame| frame.stored_from_normal(normal)));
         let confidence = normals
             .confidence
             .map(|confidence| point.map(|point| confidence[point]));
@@ -164,12 +175,17 @@ fn new_type(slot: usize) -> Scalar {
 }
 
 /// Appends confidence as a number in 0..=1, or whether it is enough to call the normal oriented: 1 or 0.
-fn write_side(slot: usize, confidence: u8, value_type: ValueType, out: &mut Vec<u8>) {
+pub(crate) fn write_side(slot: usize, confidence: u8, value_type: ValueType, out: &mut Vec<u8>) {
     if slot == SIDE.start {
-        value_type.write(f32::from(confidence) / 255.0, out);
+        value_type.write(share_of(confidence), out);
     } else {
         value_type.write_flag(confidence > UNDECIDED, out);
     }
+}
+
+/// Confidence in units of 1/255 as a number in 0..=1.
+pub(crate) fn share_of(confidence: u8) -> f32 {
+    f32::from(confidence) / 255.0
 }
 
 /// What separates the value at byte `start` from the one before it in a text.
@@ -231,51 +247,5 @@ impl Change {
             Self::Keep => out.extend_from_slice(former),
             Self::Negate => value_type.write_negated(former, out),
         }
-    }
-}
-
-/// Writes `x y z nx ny nz` for each row, in text of this style: a text's coordinates as they are, others as short as they read back.
-pub(crate) fn write_text(
-    layout: &dyn Layout,
-    bytes: &[u8],
-    style: TextStyle,
-    normals: RowNormals<'_>,
-    write: &mut dyn FnMut(&[u8]) -> Result<(), WriteError>,
-    progress: &dyn Progress,
-) -> Result<(), WriteError> {
-    let table = layout.table();
-    write(style.head(table.n_rows, true).as_bytes())?;
-    let make = |index: usize, out: &mut Vec<u8>| -> Result<(), WriteError> {
-        let part = table.part(index);
-        let mut rows = layout.rows(bytes, part.bytes.start);
-        for normal in normals.since_row(part.first_row).take(part.n_rows) {
-            let Some(spans) = rows.next_row().map_err(Stop::from)? else {
-                break;
-            };
-            for (axis, (value_type, span)) in table.types.iter().zip(&spans).take(3).enumerate() {
-                if axis > 0 {
-                    out.push(style.separator());
-                }
-                match value_type {
-                    ValueType::Text => out.extend_from_slice(span.of(bytes)),
-                    ValueType::LittleEndian(scalar) | ValueType::BigEndian(scalar) => {
-                        let value = value_type.read(span.of(bytes)).unwrap_or(f64::NAN);
-                        push_number(value, *scalar == Scalar::Float, out);
-                    }
-                }
-            }
-            push_normal(normal.unwrap_or(NO_NORMAL), style.separator(), out);
-            out.push(b'\n');
-        }
-        Ok(())
-    };
-    for_each_part(table.n_parts(), progress, make, write)
-}
-
-/// Appends a normal in text, with `separator` before each component.
-pub(crate) fn push_normal(normal: Vec3, separator: u8, out: &mut Vec<u8>) {
-    for value in normal.to_array() {
-        out.push(separator);
-        ValueType::Text.write(value, out);
     }
 }

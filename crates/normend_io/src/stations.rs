@@ -7,7 +7,8 @@ use normend_core::Silent;
 use normend_core::evidence::Station;
 
 use crate::error::{Broken, Place, quoted};
-use crate::{ReadError, Scan, read_file};
+use crate::scan::read_file;
+use crate::{ReadError, Scan};
 
 /// Names of the columns, which the table may begin with.
 const COLUMNS: [&str; 5] = ["first", "count", "x", "y", "z"];

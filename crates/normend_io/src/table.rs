@@ -6,11 +6,14 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use glam::{DVec3, Vec3};
-use normend_core::{Cancelled, Progress};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+use normend_core::{Cancelled, PointCloud, PointCloudError, Progress};
 use rayon::prelude::*;
 
-use crate::error::{Broken, Place, Stop, quoted};
+use crate::columns::Column;
+use crate::error::{Broken, Place, Stop, WriteError, quoted};
+use crate::output::Output;
+use crate::rewrite::RowNormals;
 use crate::value::ValueType;
 
 /// Rows of a part: the unit of parallel work.
@@ -84,6 +87,58 @@ pub(crate) struct Table {
     pub starts: Starts,
     /// The byte after the last row.
     pub end: usize,
+    /// The frames that rows are measured in, ascending and without gaps from row 0 on; empty when what is stored is the
+    /// scan's coordinates.
+    pub frames: Vec<Frame>,
+}
+
+/// Some rows that were measured from one place, or are stored in coordinates of their own.
+#[derive(Clone, Debug)]
+pub(crate) struct Frame {
+    pub first_row: usize,
+    /// What the file calls it; may be empty.
+    pub name: String,
+    /// From what is stored to the scan's coordinates.
+    pub from_stored: DAffine3,
+    /// The same for directions: a rotation.
+    pub turn: DMat3,
+    /// Where the scanner stood, in the scan's coordinates, if the file says so.
+    pub station: Option<DVec3>,
+}
+
+impl Frame {
+    /// Rows from `first_row` on that are stored as they are.
+    pub fn plain(first_row: usize) -> Self {
+        Self {
+            first_row,
+            name: String::new(),
+            from_stored: DAffine3::IDENTITY,
+            turn: DMat3::IDENTITY,
+            station: None,
+        }
+    }
+
+    fn is_turned(&self) -> bool {
+        self.turn != DMat3::IDENTITY
+    }
+
+    /// A stored direction in the scan's coordinates.
+    pub fn normal_from_stored(&self, normal: Vec3) -> Vec3 {
+        if self.is_turned() {
+            (self.turn * normal.as_dvec3()).as_vec3()
+        } else {
+            normal
+        }
+    }
+
+    /// A direction in the scan's coordinates as it is stored.
+    pub fn stored_from_normal(&self, normal: Vec3) -> Vec3 {
+        if self.is_turned() {
+            (self.turn.transpose() * normal.as_dvec3()).as_vec3()
+        } else {
+            normal
+        }
+    }
 }
 
 /// Where rows begin.
@@ -114,6 +169,18 @@ impl Table {
         let range = if self.has_normals { NORMAL } else { COORDINATES };
         let last = self.order.iter().rev().find(|&&slot| range.contains(&slot));
         last.copied().unwrap_or(2)
+    }
+
+    /// The frame of each row from `first_row` on, without end; `None` for rows that are stored as they are.
+    pub fn frames_since_row(&self, first_row: usize) -> impl Iterator<Item = Option<&Frame>> {
+        let mut next = self.frames.partition_point(|frame| frame.first_row <= first_row);
+        (first_row..).map(move |row| {
+            // More than one frame may begin at a row: those without rows are passed over.
+            while self.frames.get(next).is_some_and(|frame| frame.first_row <= row) {
+                next += 1;
+            }
+            self.frames.get(next.checked_sub(1)?)
+        })
     }
 
     pub fn n_parts(&self) -> usize {
@@ -156,7 +223,7 @@ impl Table {
 }
 
 /// A format's knowledge of one file.
-pub(crate) trait Layout: Sync {
+pub(crate) trait Layout: Send + Sync {
     fn table(&self) -> &Table;
 
     /// The rows from byte `start` on, where a part begins.
@@ -168,6 +235,82 @@ pub(crate) trait Layout: Sync {
     /// Whether this byte separates values in text.
     fn is_separator(&self, byte: u8) -> bool {
         is_space(byte)
+    }
+
+    /// All values of a row but lists, in the file's order, coordinates and normals among them.
+    fn columns(&self, bytes: &[u8]) -> Vec<Column>;
+
+    /// The column that holds the value of a slot.
+    fn column_of(&self, slot: usize) -> Option<usize>;
+
+    /// The same rows with other values: the coordinates, and some columns, at most [`MOST_COLUMNS`]. Returns the slots of these.
+    fn with_columns(&self, columns: &[usize]) -> (Box<dyn Layout>, Vec<usize>);
+
+    /// Columns that hold red, green and blue without saying so.
+    fn unnamed_colors(&self, _bytes: &[u8]) -> Option<[usize; 3]> {
+        None
+    }
+
+    /// What the file holds that is no value of a row, in words ("12 rows of element \"face\"").
+    fn besides_rows(&self, _bytes: &[u8]) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Whether confidence can be written.
+    fn can_hold_side(&self) -> bool;
+
+    /// Writes the file again with other normals and nothing else changed.
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        content: &NewContent<'_>,
+        out: &mut Output<'_>,
+        progress: &dyn Progress,
+    ) -> Result<(), WriteError>;
+}
+
+/// What is new in a file that is written again.
+#[derive(Clone, Copy)]
+pub(crate) struct NewContent<'a> {
+    pub normals: RowNormals<'a>,
+    /// One line that names program, version and rule.
+    pub comment: &'a str,
+}
+
+/// The most columns besides the coordinates that rows can give at a time.
+pub(crate) const MOST_COLUMNS: usize = N_VALUES - COORDINATES.end;
+
+/// Rows that all have the same size and their values at the same places.
+pub(crate) struct FixedRows {
+    at: usize,
+    stride: usize,
+    offsets: Spans,
+}
+
+impl FixedRows {
+    /// Rows of `stride` bytes from byte `start` on; `offsets` are the values' bytes within a row.
+    pub fn new(start: usize, stride: usize, offsets: Spans) -> Self {
+        Self {
+            at: start,
+            stride,
+            offsets,
+        }
+    }
+}
+
+impl Rows for FixedRows {
+    #[inline]
+    fn next_row(&mut self) -> Result<Option<Spans>, Broken> {
+        let at = self.at;
+        self.at += self.stride;
+        Ok(Some(self.offsets.map(|span| Span {
+            start: at + span.start,
+            end: at + span.end,
+        })))
+    }
+
+    fn position(&self) -> usize {
+        self.at
     }
 }
 
@@ -194,69 +337,146 @@ pub(crate) fn find_parts(
     Ok((starts, n_rows, rows.position()))
 }
 
-/// The values of all rows, finite or not.
-pub(crate) struct Values {
-    pub positions: Vec<DVec3>,
-    /// Zero where a component is not finite; `None` without normals.
+/// The points of a file.
+pub(crate) struct Points {
+    pub cloud: PointCloud,
+    /// By point, zero where a component is not finite; `None` without normals.
     pub normals: Option<Vec<Vec3>>,
+    /// The row of each point, ascending; `None` when every row is a point.
+    pub rows: Option<Vec<u32>>,
 }
 
-/// Reads the values of all rows, in parallel.
-pub(crate) fn read_values(layout: &dyn Layout, bytes: &[u8], progress: &dyn Progress) -> Result<Values, Stop> {
+/// What is known of a part's rows before they are stored.
+#[derive(Clone, Copy)]
+struct Summary {
+    n_finite: usize,
+    min: DVec3,
+    max: DVec3,
+}
+
+/// Reads the rows whose coordinates are finite, in parallel. Goes over the rows twice, first to find the origin and what is
+/// finite, so that nothing is kept but what is returned.
+pub(crate) fn read_points(layout: &dyn Layout, bytes: &[u8], progress: &dyn Progress) -> Result<Points, Stop> {
     let table = layout.table();
-    let mut positions = vec![DVec3::ZERO; table.n_rows];
-    let mut normals = vec![Vec3::ZERO; if table.has_normals { table.n_rows } else { 0 }];
     let n_done = AtomicUsize::new(0);
-    let read = |index: usize, positions: &mut [DVec3], normals: &mut [Vec3]| -> Result<(), Stop> {
-        // Before the work, because every part is begun, also when another one stopped.
-        progress.report(n_done.load(Ordering::Relaxed) as f32 / table.n_parts() as f32)?;
-        let part = table.part(index);
-        let mut rows = layout.rows(bytes, part.bytes.start);
-        for row in 0..part.n_rows {
-            let Some(spans) = rows.next_row()? else {
-                break;
+    // Before the work, because every part is begun, also when another one stopped.
+    let report = || progress.report(n_done.fetch_add(1, Ordering::Relaxed) as f32 / (2 * table.n_parts()) as f32);
+    let summaries: Vec<Result<Summary, Stop>> = (0..table.n_parts())
+        .into_par_iter()
+        .map(|index| {
+            report()?;
+            let mut summary = Summary {
+                n_finite: 0,
+                min: DVec3::INFINITY,
+                max: DVec3::NEG_INFINITY,
             };
-            let value = |slot: usize| -> Result<f64, Broken> {
-                let token = spans[slot].of(bytes);
-                table.types[slot].read(token).ok_or_else(|| {
-                    Broken::new(
-                        layout.place(bytes, spans[slot].start),
-                        format!(
-                            "{} is {}, which is not a number: correct it",
-                            VALUE_NAMES[slot],
-                            quoted(token)
-                        ),
-                    )
-                })
-            };
-            positions[row] = DVec3::new(value(0)?, value(1)?, value(2)?);
-            if table.has_normals {
-                let normal = Vec3::new(value(3)? as f32, value(4)? as f32, value(5)? as f32);
-                normals[row] = if normal.is_finite() { normal } else { Vec3::ZERO };
-            }
-        }
-        n_done.fetch_add(1, Ordering::Relaxed);
-        Ok(())
-    };
-    let results: Vec<Result<(), Stop>> = if table.has_normals {
-        positions
-            .par_chunks_mut(PART_ROWS)
-            .zip(normals.par_chunks_mut(PART_ROWS))
-            .enumerate()
-            .map(|(index, (positions, normals))| read(index, positions, normals))
-            .collect()
-    } else {
-        let chunks = positions.par_chunks_mut(PART_ROWS).enumerate();
-        chunks
-            .map(|(index, positions)| read(index, positions, &mut []))
-            .collect()
-    };
+            read_part(layout, bytes, table.part(index), |_, position, _| {
+                if position.is_finite() {
+                    summary.n_finite += 1;
+                    summary.min = summary.min.min(position);
+                    summary.max = summary.max.max(position);
+                }
+            })?;
+            Ok(summary)
+        })
+        .collect();
     // The first error in the file's order, whichever thread met one first.
+    let summaries = summaries.into_iter().collect::<Result<Vec<Summary>, Stop>>()?;
+    let n_points = summaries.iter().map(|summary| summary.n_finite).sum();
+    if n_points == 0 {
+        return Err(Broken::whole("no point has finite coordinates: export the file again").into());
+    }
+    let unfit = |error: PointCloudError| Stop::from(Broken::whole(error.to_string()));
+    let min = summaries.iter().fold(DVec3::INFINITY, |min, part| min.min(part.min));
+    let max = summaries
+        .iter()
+        .fold(DVec3::NEG_INFINITY, |max, part| max.max(part.max));
+    let origin = PointCloud::origin_for(min, max).map_err(unfit)?;
+
+    let has_rows = n_points < table.n_rows;
+    let mut positions = vec![Vec3::ZERO; n_points];
+    let mut normals = vec![Vec3::ZERO; if table.has_normals { n_points } else { 0 }];
+    let mut rows = vec![0_u32; if has_rows { n_points } else { 0 }];
+    let mut parts = Vec::with_capacity(summaries.len());
+    let (mut positions_left, mut normals_left, mut rows_left) = (&mut positions[..], &mut normals[..], &mut rows[..]);
+    for (index, summary) in summaries.iter().enumerate() {
+        let n_finite = summary.n_finite;
+        let (part_positions, rest) = positions_left.split_at_mut(n_finite);
+        positions_left = rest;
+        let (part_normals, rest) = normals_left.split_at_mut(if table.has_normals { n_finite } else { 0 });
+        normals_left = rest;
+        let (part_rows, rest) = rows_left.split_at_mut(if has_rows { n_finite } else { 0 });
+        rows_left = rest;
+        parts.push((index, part_positions, part_normals, part_rows));
+    }
+    let results: Vec<Result<(), Stop>> = parts
+        .into_par_iter()
+        .map(|(index, positions, normals, rows)| {
+            report()?;
+            let mut point = 0;
+            read_part(layout, bytes, table.part(index), |row, position, normal| {
+                if !position.is_finite() {
+                    return;
+                }
+                positions[point] = (position - origin).as_vec3();
+                if let Some(slot) = normals.get_mut(point) {
+                    *slot = if normal.is_finite() { normal } else { Vec3::ZERO };
+                }
+                if let Some(slot) = rows.get_mut(point) {
+                    // Row numbers fit, because no layout has more rows than ids.
+                    *slot = row as u32;
+                }
+                point += 1;
+            })
+        })
+        .collect();
     results.into_iter().collect::<Result<(), Stop>>()?;
-    Ok(Values {
-        positions,
+    Ok(Points {
+        cloud: PointCloud::new(origin, positions).map_err(unfit)?,
         normals: table.has_normals.then_some(normals),
+        rows: has_rows.then_some(rows),
     })
+}
+
+/// Hands row, position and normal (zero where there is none) of each row of a part to `take`, in the scan's coordinates.
+fn read_part(
+    layout: &dyn Layout,
+    bytes: &[u8],
+    part: Part,
+    mut take: impl FnMut(usize, DVec3, Vec3),
+) -> Result<(), Stop> {
+    let table = layout.table();
+    let mut rows = layout.rows(bytes, part.bytes.start);
+    let mut frames = table.frames_since_row(part.first_row);
+    for row in part.first_row..part.first_row + part.n_rows {
+        let Some(spans) = rows.next_row()? else {
+            break;
+        };
+        let value = |slot: usize| -> Result<f64, Broken> {
+            let token = spans[slot].of(bytes);
+            table.types[slot].read(token).ok_or_else(|| {
+                Broken::new(
+                    layout.place(bytes, spans[slot].start),
+                    format!(
+                        "{} is {}, which is not a number: correct it",
+                        VALUE_NAMES[slot],
+                        quoted(token)
+                    ),
+                )
+            })
+        };
+        let mut position = DVec3::new(value(0)?, value(1)?, value(2)?);
+        let mut normal = Vec3::ZERO;
+        if table.has_normals {
+            normal = Vec3::new(value(3)? as f32, value(4)? as f32, value(5)? as f32);
+        }
+        if let Some(frame) = frames.next().flatten() {
+            position = frame.from_stored.transform_point3(position);
+            normal = frame.normal_from_stored(normal);
+        }
+        take(row, position, normal);
+    }
+    Ok(())
 }
 
 /// Makes the bytes of each part in parallel and hands them to `sink` in order.

@@ -9,6 +9,9 @@ pub(crate) enum Scalar {
     UShort,
     Int,
     UInt,
+    /// 64 bits, which PLY has not.
+    Long,
+    ULong,
     Float,
     Double,
 }
@@ -20,7 +23,7 @@ impl Scalar {
             Self::Char | Self::UChar => 1,
             Self::Short | Self::UShort => 2,
             Self::Int | Self::UInt | Self::Float => 4,
-            Self::Double => 8,
+            Self::Long | Self::ULong | Self::Double => 8,
         }
     }
 
@@ -46,6 +49,8 @@ macro_rules! from_bytes {
             Scalar::UShort => f64::from(u16::$convert($bytes.try_into().ok()?)),
             Scalar::Int => f64::from(i32::$convert($bytes.try_into().ok()?)),
             Scalar::UInt => f64::from(u32::$convert($bytes.try_into().ok()?)),
+            Scalar::Long => i64::$convert($bytes.try_into().ok()?) as f64,
+            Scalar::ULong => u64::$convert($bytes.try_into().ok()?) as f64,
             Scalar::Float => f64::from(f32::$convert($bytes.try_into().ok()?)),
             Scalar::Double => f64::$convert($bytes.try_into().ok()?),
         }
@@ -53,6 +58,31 @@ macro_rules! from_bytes {
 }
 
 impl ValueType {
+    /// The type of a binary number.
+    pub fn scalar(self) -> Option<Scalar> {
+        match self {
+            Self::Text => None,
+            Self::LittleEndian(scalar) | Self::BigEndian(scalar) => Some(scalar),
+        }
+    }
+
+    /// Size in bytes; 0 for text, which has none.
+    pub fn size(self) -> usize {
+        self.scalar().map_or(0, Scalar::size)
+    }
+
+    /// Reads the whole number that `bytes` are, where `f64` would round it: 64 bits, which nothing but binary files has.
+    pub fn read_long(self, bytes: &[u8]) -> Option<i128> {
+        let bytes: [u8; 8] = bytes.try_into().ok()?;
+        Some(match self {
+            Self::LittleEndian(Scalar::Long) => i64::from_le_bytes(bytes).into(),
+            Self::BigEndian(Scalar::Long) => i64::from_be_bytes(bytes).into(),
+            Self::LittleEndian(Scalar::ULong) => u64::from_le_bytes(bytes).into(),
+            Self::BigEndian(Scalar::ULong) => u64::from_be_bytes(bytes).into(),
+            _ => return None,
+        })
+    }
+
     /// Reads the number that `bytes` are, all of them; `None` when they are not one.
     #[inline]
     pub fn read(self, bytes: &[u8]) -> Option<f64> {

@@ -6,10 +6,13 @@
 
 use normend_core::{PointCloud, Progress};
 
-use crate::error::{Broken, Place, Stop, quoted};
-use crate::scalars::{Column, slots_for};
+use crate::columns::{Column, ColumnKind, slots_for};
+use crate::error::{Broken, Place, Stop, WriteError, quoted};
+use crate::output::Output;
+use crate::rewrite::{rewrite, separator_before};
 use crate::table::{
-    COORDINATES, Layout, N_VALUES, NORMAL, Rows, SIDE, Span, Spans, Starts, Table, VALUE_NAMES, find_parts, is_space,
+    COORDINATES, Layout, N_VALUES, NORMAL, NewContent, Rows, SIDE, Span, Spans, Starts, Table, VALUE_NAMES, find_parts,
+    is_space,
 };
 use crate::value::{ValueType, parse};
 
@@ -51,6 +54,7 @@ pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<XyzLayout, S
             order: Vec::new(),
             starts: Starts::Parts(Vec::new()),
             end: 0,
+            frames: Vec::new(),
         },
     };
     let start = layout.find_columns(bytes)?;
@@ -239,33 +243,9 @@ impl XyzLayout {
         lines.map(|line| line.of(bytes)).filter(is_row).take(SAMPLE_ROWS)
     }
 
-    /// The columns of numbers, as far as the first row tells.
-    pub(crate) fn columns(&self, bytes: &[u8]) -> Vec<Column> {
-        let row = self.sample(bytes).next().unwrap_or_default();
-        let names = self.names.map_or(&b""[..], |names| names.of(bytes));
-        let mut names = Values::new(names).map(|name| {
-            let name = String::from_utf8_lossy(name.of(names)).into_owned();
-            name.trim_matches(['"', '\'']).to_owned()
-        });
-        let mut columns: Vec<Column> = Vec::new();
-        for (index, value) in Values::new(row).enumerate() {
-            let name = names.next().filter(|name| !name.is_empty());
-            let value = value.of(row);
-            if value.is_empty() || parse(value).is_some() {
-                let mut name = name.unwrap_or_else(|| format!("Column {}", index + 1));
-                // Two columns of one name are told apart by where they stand.
-                if columns.iter().any(|column| column.name == name) {
-                    name = format!("{name} (column {})", index + 1);
-                }
-                columns.push(Column { name, index });
-            }
-        }
-        columns
-    }
-
     /// The last three of six or seven columns without names, as programs write points with colors, or with intensity and colors:
     /// whole numbers up to 255 in all of the first rows, and not only 0 and 1.
-    pub(crate) fn sample_of_colors(&self, bytes: &[u8]) -> Option<[usize; 3]> {
+    fn sample_of_colors(&self, bytes: &[u8]) -> Option<[usize; 3]> {
         if self.names.is_some() || self.table.has_normals {
             return None;
         }
@@ -289,24 +269,9 @@ impl XyzLayout {
         Some([last - 3, last - 2, last - 1])
     }
 
-    /// The same rows with other values: the coordinates, and these columns. Returns the slots of the latter.
-    pub(crate) fn with_columns(&self, columns: &[usize]) -> (Self, Vec<usize>) {
-        let (columns, slots) = slots_for(&self.columns[COORDINATES], columns);
-        let layout = Self {
-            columns,
-            ..self.clone()
-        };
-        (layout, slots)
-    }
-
-    /// Whether confidence can be written: without names nobody would know what the columns are, nor which are a normal's.
-    pub(crate) fn can_hold_side(&self) -> bool {
-        self.names.is_some()
-    }
-
     /// What changes before the first row when normals, and `with_side` confidence, are written: the names of their columns, if
     /// columns have names.
-    pub(crate) fn header_edits(&self, bytes: &[u8], with_side: bool) -> Vec<(Span, Vec<u8>)> {
+    fn header_edits(&self, bytes: &[u8], with_side: bool) -> Vec<(Span, Vec<u8>)> {
         let written = if with_side { NORMAL.start..SIDE.end } else { NORMAL };
         let new_names: Vec<&str> = written
             .filter(|&slot| self.columns[slot].is_none())
@@ -322,7 +287,7 @@ impl XyzLayout {
         };
         let at = names.start + name.end;
         let name = name.of(content);
-        let separator = crate::rewrite::separator_before(self, bytes, at - name.len());
+        let separator = separator_before(self, bytes, at - name.len());
         let mut insertion = Vec::new();
         for new_name in new_names {
             insertion.extend_from_slice(separator);
@@ -352,6 +317,66 @@ impl Layout for XyzLayout {
 
     fn is_separator(&self, byte: u8) -> bool {
         is_space(byte) || matches!(byte, b',' | b';')
+    }
+
+    fn columns(&self, bytes: &[u8]) -> Vec<Column> {
+        let row = self.sample(bytes).next().unwrap_or_default();
+        let names = self.names.map_or(&b""[..], |names| names.of(bytes));
+        let mut names = Values::new(names).map(|name| {
+            let name = String::from_utf8_lossy(name.of(names)).into_owned();
+            name.trim_matches(['"', '\'']).to_owned()
+        });
+        let mut columns: Vec<Column> = Vec::new();
+        for (index, value) in Values::new(row).enumerate() {
+            let name = names.next().filter(|name| !name.is_empty());
+            let value = value.of(row);
+            let mut name = name.unwrap_or_else(|| format!("Column {}", index + 1));
+            // Two columns of one name are told apart by where they stand.
+            if columns.iter().any(|column| column.name == name) {
+                name = format!("{name} (column {})", index + 1);
+            }
+            let is_number = value.is_empty() || parse(value).is_some();
+            let kind = if is_number {
+                ColumnKind::Decimal
+            } else {
+                ColumnKind::Words
+            };
+            columns.push(Column { name, index, kind });
+        }
+        columns
+    }
+
+    fn column_of(&self, slot: usize) -> Option<usize> {
+        self.columns[slot]
+    }
+
+    fn with_columns(&self, columns: &[usize]) -> (Box<dyn Layout>, Vec<usize>) {
+        let (columns, slots) = slots_for(&self.columns[COORDINATES], columns);
+        let layout = Self {
+            columns,
+            ..self.clone()
+        };
+        (Box::new(layout), slots)
+    }
+
+    fn unnamed_colors(&self, bytes: &[u8]) -> Option<[usize; 3]> {
+        self.sample_of_colors(bytes)
+    }
+
+    // Without names nobody would know what the columns are, nor which are a normal's.
+    fn can_hold_side(&self) -> bool {
+        self.names.is_some()
+    }
+
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        content: &NewContent<'_>,
+        out: &mut Output<'_>,
+        progress: &dyn Progress,
+    ) -> Result<(), WriteError> {
+        let edits = self.header_edits(bytes, content.normals.has_confidence());
+        rewrite(self, bytes, &edits, content.normals, out, progress)
     }
 }
 

@@ -6,18 +6,23 @@
 mod header;
 mod rows;
 
+pub(crate) mod new;
+
 use std::ops::Range;
 
 use normend_core::{PointCloud, PointCloudError, Progress};
 use ply_rs::ply::Encoding;
 
 pub(crate) use self::header::sniff;
-use self::header::{Element, Header, Kind};
-use self::rows::{FixedRows, WalkedRows, skip_element};
-use crate::error::{Broken, Place, Stop, quoted};
-use crate::scalars::{Column, slots_for};
+use self::header::{Element, Header, Kind, Property};
+use self::rows::{WalkedRows, offsets, skip_element};
+use crate::columns::{Column, ColumnKind, slots_for};
+use crate::error::{Broken, Place, Stop, WriteError, quoted};
+use crate::output::Output;
+use crate::rewrite::rewrite;
 use crate::table::{
-    COORDINATES, Layout, N_VALUES, NORMAL, Rows, SIDE, Span, Starts, Table, VALUE_NAMES, find_parts, is_space,
+    COORDINATES, FixedRows, Layout, N_VALUES, NORMAL, NewContent, Rows, SIDE, Span, Starts, Table, VALUE_NAMES,
+    find_parts, is_space,
 };
 use crate::value::Scalar;
 
@@ -76,6 +81,7 @@ pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<PlyLayout, S
             order,
             starts: Starts::Parts(Vec::new()),
             end: at,
+            frames: Vec::new(),
         },
         header,
     };
@@ -194,7 +200,7 @@ impl Layout for PlyLayout {
         let element = &self.header.elements[self.vertex];
         match (self.header.encoding, element.stride()) {
             (Encoding::BinaryLittleEndian | Encoding::BinaryBigEndian, Some(stride)) => {
-                Box::new(FixedRows::new(element, &self.slots, start, stride))
+                Box::new(FixedRows::new(start, stride, offsets(element, &self.slots)))
             }
             _ => Box::new(WalkedRows::new(bytes, &self.header, element, &self.slots, start)),
         }
@@ -203,33 +209,25 @@ impl Layout for PlyLayout {
     fn place(&self, bytes: &[u8], byte: usize) -> Place {
         rows::place(&self.header, bytes, byte)
     }
-}
 
-impl PlyLayout {
-    /// The numbers of a row: properties that are no lists.
-    pub(crate) fn columns(&self) -> Vec<Column> {
-        let properties = &self.header.elements[self.vertex].properties;
-        let scalars = properties
-            .iter()
-            .enumerate()
-            .filter(|(_, property)| matches!(property.kind, Kind::Scalar(_)));
-        scalars
-            .map(|(index, property)| Column {
+    fn columns(&self, _bytes: &[u8]) -> Vec<Column> {
+        let properties = self.header.elements[self.vertex].properties.iter().enumerate();
+        let column = |(index, property): (usize, &Property)| match property.kind {
+            Kind::Scalar(scalar) => Some(Column {
                 name: property.name.clone(),
                 index,
-            })
-            .collect()
+                kind: ColumnKind::Number(scalar),
+            }),
+            Kind::List { .. } => None,
+        };
+        properties.filter_map(column).collect()
     }
 
-    /// Whether the property of a row is declared as bytes.
-    pub(crate) fn is_byte(&self, property: usize) -> bool {
-        let properties = &self.header.elements[self.vertex].properties;
-        matches!(properties[property].kind, Kind::Scalar(Scalar::UChar))
+    fn column_of(&self, slot: usize) -> Option<usize> {
+        self.slots.properties[slot]
     }
 
-    /// The same rows with other values: the coordinates, and the properties `columns`, which are no lists. Returns the slots of
-    /// these.
-    pub(crate) fn with_columns(&self, columns: &[usize]) -> (Self, Vec<usize>) {
+    fn with_columns(&self, columns: &[usize]) -> (Box<dyn Layout>, Vec<usize>) {
         let (properties, slots) = slots_for(&self.slots.properties[COORDINATES], columns);
         let mut layout = Self {
             slots: Slots { properties },
@@ -243,9 +241,48 @@ impl PlyLayout {
                 layout.table.types[slot] = self.header.value_type(scalar);
             }
         }
-        (layout, slots)
+        (Box::new(layout), slots)
     }
 
+    fn besides_rows(&self, _bytes: &[u8]) -> Vec<String> {
+        let elements = self.header.elements.iter().enumerate();
+        let others = elements.filter(|(index, element)| *index != self.vertex && element.count > 0);
+        let mut besides: Vec<String> = others
+            .map(|(_, element)| format!("{} rows of element \"{}\"", element.count, element.name))
+            .collect();
+        let properties = &self.header.elements[self.vertex].properties;
+        let lists = properties
+            .iter()
+            .filter(|property| matches!(property.kind, Kind::List { .. }));
+        besides.extend(lists.map(|property| format!("the list \"{}\" of each point", property.name)));
+        besides
+    }
+
+    fn can_hold_side(&self) -> bool {
+        // Not where a list has its name.
+        let element = &self.header.elements[self.vertex];
+        SIDE.into_iter().all(|slot| {
+            let has_name = element
+                .properties
+                .iter()
+                .any(|property| property.name == VALUE_NAMES[slot]);
+            self.table.has(slot) || !has_name
+        })
+    }
+
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        content: &NewContent<'_>,
+        out: &mut Output<'_>,
+        progress: &dyn Progress,
+    ) -> Result<(), WriteError> {
+        let edits = self.header_edits(content.comment, content.normals.has_confidence());
+        rewrite(self, bytes, &edits, content.normals, out, progress)
+    }
+}
+
+impl PlyLayout {
     /// In text, a row that is short or long shifts all that follow, and the end of the file is where that shows. So a
     /// line that holds another number of values than a row, below lines that hold the right one, is named instead.
     fn clearer(&self, bytes: &[u8], start: usize, stop: Stop) -> Stop {
@@ -297,25 +334,13 @@ impl PlyLayout {
         None
     }
 
-    /// Whether confidence can be written: not where a list has its name.
-    pub(crate) fn can_hold_side(&self) -> bool {
-        let element = &self.header.elements[self.vertex];
-        SIDE.into_iter().all(|slot| {
-            let has_name = element
-                .properties
-                .iter()
-                .any(|property| property.name == VALUE_NAMES[slot]);
-            self.table.has(slot) || !has_name
-        })
-    }
-
     /// What changes before the first row when normals and `comment` are written: ranges of bytes and what takes their
     /// place, in order.
     /// `with_side` when confidence is written too.
-    pub(crate) fn header_edits(&self, comment: &str, with_side: bool) -> Vec<(Span, Vec<u8>)> {
+    fn header_edits(&self, comment: &str, with_side: bool) -> Vec<(Span, Vec<u8>)> {
         let header = &self.header;
         let line_end = header.line_end;
-        let comment = comment.as_bytes().to_vec();
+        let comment = [b"comment ", comment.as_bytes()].concat();
         let mut edits = Vec::new();
         match header.own_comment {
             Some(span) => edits.push((span, comment)),
@@ -351,26 +376,4 @@ impl PlyLayout {
         edits.sort_by_key(|(span, _)| span.start);
         edits
     }
-}
-
-/// The header of a new binary little-endian file of points with `float` or `double` coordinates.
-pub(crate) fn new_header(n_points: usize, coordinates: Scalar, has_normals: bool, comment: Option<&str>) -> String {
-    let coordinate_type = if coordinates == Scalar::Double {
-        "double"
-    } else {
-        "float"
-    };
-    let mut lines = vec!["ply".to_owned(), "format binary_little_endian 1.0".to_owned()];
-    lines.extend(comment.map(str::to_owned));
-    lines.push(format!("element vertex {n_points}"));
-    lines.extend(
-        VALUE_NAMES[..3]
-            .iter()
-            .map(|name| format!("property {coordinate_type} {name}")),
-    );
-    if has_normals {
-        lines.extend(VALUE_NAMES[NORMAL].iter().map(|name| format!("property float {name}")));
-    }
-    lines.push("end_header\n".to_owned());
-    lines.join("\n")
 }

@@ -183,52 +183,24 @@ fn slots_of_properties(element: &Element, slots: &Slots) -> Vec<Option<usize>> {
     (0..element.properties.len()).map(slot_of).collect()
 }
 
-/// Binary rows that all have the same size.
-pub(crate) struct FixedRows {
-    at: usize,
-    stride: usize,
-    offsets: Spans,
-}
-
-impl FixedRows {
-    pub fn new(element: &Element, slots: &Slots, start: usize, stride: usize) -> Self {
-        let mut offsets = Spans::default();
-        let mut offset = 0;
-        for (property, slot) in element.properties.iter().zip(slots_of_properties(element, slots)) {
-            let size = match property.kind {
-                Kind::Scalar(scalar) => scalar.size(),
-                Kind::List { .. } => 0,
+/// Where the values are in binary rows that all have the same size.
+pub(crate) fn offsets(element: &Element, slots: &Slots) -> Spans {
+    let mut offsets = Spans::default();
+    let mut offset = 0;
+    for (property, slot) in element.properties.iter().zip(slots_of_properties(element, slots)) {
+        let size = match property.kind {
+            Kind::Scalar(scalar) => scalar.size(),
+            Kind::List { .. } => 0,
+        };
+        if let Some(slot) = slot {
+            offsets[slot] = Span {
+                start: offset,
+                end: offset + size,
             };
-            if let Some(slot) = slot {
-                offsets[slot] = Span {
-                    start: offset,
-                    end: offset + size,
-                };
-            }
-            offset += size;
         }
-        Self {
-            at: start,
-            stride,
-            offsets,
-        }
+        offset += size;
     }
-}
-
-impl Rows for FixedRows {
-    #[inline]
-    fn next_row(&mut self) -> Result<Option<Spans>, Broken> {
-        let at = self.at;
-        self.at += self.stride;
-        Ok(Some(self.offsets.map(|span| Span {
-            start: at + span.start,
-            end: at + span.end,
-        })))
-    }
-
-    fn position(&self) -> usize {
-        self.at
-    }
+    offsets
 }
 
 /// Rows that are walked through value by value, because lists give each its own size.

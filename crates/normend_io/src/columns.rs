@@ -8,8 +8,9 @@ use normend_core::Progress;
 use rayon::prelude::*;
 
 use crate::error::{Broken, ReadError, Stop, quoted};
+use crate::scan::Scan;
 use crate::table::{COORDINATES, Layout, N_VALUES, PART_ROWS};
-use crate::{Scan, SourceLayout};
+use crate::value::Scalar;
 
 /// Names of columns that hold red, green and blue, in lower case.
 const COLOR_NAMES: [[&str; 3]; 4] = [
@@ -19,15 +20,28 @@ const COLOR_NAMES: [[&str; 3]; 4] = [
     ["scalar_red", "scalar_green", "scalar_blue"],
 ];
 
-/// A column of numbers: its name, and which value of the row it is, from 0.
+/// A value that every row has: its name, and which value of the row it is, from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Column {
     pub name: String,
     pub index: usize,
+    pub kind: ColumnKind,
+}
+
+/// What the values of a column are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ColumnKind {
+    /// Binary numbers.
+    Number(Scalar),
+    /// Numbers in text, as far as the first row tells.
+    Decimal,
+    /// Text that is no number.
+    Words,
 }
 
 /// The values of a row for columns that were asked for: the coordinates stay, so that rows are told from what is none, and
-/// the others take the places after them. Returns the column of each slot and the slots of `columns`, which are at most five.
+/// the others take the places after them. Returns the column of each slot and the slots of `columns`, which are at most
+/// [`crate::table::MOST_COLUMNS`].
 pub(crate) fn slots_for(coordinates: &[Option<usize>], columns: &[usize]) -> ([Option<usize>; N_VALUES], Vec<usize>) {
     let mut slots = [None; N_VALUES];
     slots[COORDINATES].copy_from_slice(coordinates);
@@ -88,10 +102,10 @@ impl Scan {
             finite.reduce(|| 0.0, f64::max)
         };
         let largest = channels.iter().map(largest).fold(0.0, f64::max);
-        let are_bytes = match &self.file.layout {
-            SourceLayout::Ply(ply) => columns.iter().all(|&column| ply.is_byte(column)),
-            SourceLayout::Xyz(_) => false,
-        };
+        let is_byte = |column: &Column| column.kind == ColumnKind::Number(Scalar::UChar);
+        let are_bytes = (self.columns().iter())
+            .filter(|column| columns.contains(&column.index))
+            .all(is_byte);
         let white = match largest {
             _ if are_bytes => 255.0,
             // Some programs go a little beyond 1.
@@ -109,11 +123,11 @@ impl Scan {
         Ok(Some(colors))
     }
 
+    /// The columns of numbers.
     fn columns(&self) -> Vec<Column> {
-        match &self.file.layout {
-            SourceLayout::Ply(ply) => ply.columns(),
-            SourceLayout::Xyz(xyz) => xyz.columns(&self.file.bytes),
-        }
+        let mut columns = self.file.layout.columns(&self.file.bytes);
+        columns.retain(|column| column.kind != ColumnKind::Words);
+        columns
     }
 
     fn color_columns(&self) -> Option<[usize; 3]> {
@@ -126,10 +140,7 @@ impl Scan {
             let [red, green, blue] = names.map(find);
             Some([red?, green?, blue?])
         });
-        by_name.or_else(|| match &self.file.layout {
-            SourceLayout::Ply(_) => None,
-            SourceLayout::Xyz(xyz) => xyz.sample_of_colors(&self.file.bytes),
-        })
+        by_name.or_else(|| self.file.layout.unnamed_colors(&self.file.bytes))
     }
 
     /// The values of some columns, by point.
@@ -139,17 +150,8 @@ impl Scan {
         progress: &dyn Progress,
     ) -> Result<[Vec<f64>; N], ReadError> {
         progress.stage("Reading values");
-        let bytes = &self.file.bytes[..];
-        let read = match &self.file.layout {
-            SourceLayout::Ply(ply) => {
-                let (layout, slots) = ply.with_columns(&columns);
-                read_slots(&layout, bytes, &slots, progress)
-            }
-            SourceLayout::Xyz(xyz) => {
-                let (layout, slots) = xyz.with_columns(&columns);
-                read_slots(&layout, bytes, &slots, progress)
-            }
-        };
+        let (layout, slots) = self.file.layout.with_columns(&columns);
+        let read = read_slots(layout.as_ref(), &self.file.bytes, &slots, progress);
         let name = self.path().map_or("the scan".into(), |path| path.display().to_string());
         let values = read.map_err(|stop| stop.in_file(&name))?;
         Ok(std::array::from_fn(|column| {

@@ -1,0 +1,101 @@
+//! Points in a new text, as programs expect it of the extension.
+
+use std::path::Path;
+
+use normend_core::Progress;
+
+use crate::error::WriteError;
+use crate::new_file::{Loss, NewFile, plain_names};
+use crate::output::Output;
+use crate::rewrite::share_of;
+use crate::table::{SIDE, VALUE_NAMES};
+use crate::value::ValueType;
+
+/// How a text is laid out that is no copy of a text, by what programs expect of its extension.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum TextStyle {
+    /// `.xyz` and the like: values with spaces between them; the names of the columns in a comment when there are more than
+    /// coordinates and a normal.
+    Plain,
+    /// `.pts`: the number of points first.
+    Pts,
+    /// `.csv`: the names of the columns first, and commas.
+    Csv,
+}
+
+impl TextStyle {
+    fn of_path(path: &Path) -> Self {
+        let has = |name: &str| {
+            path.extension()
+                .is_some_and(|extension| extension.eq_ignore_ascii_case(name))
+        };
+        if has("csv") {
+            Self::Csv
+        } else if has("pts") {
+            Self::Pts
+        } else {
+            Self::Plain
+        }
+    }
+}
+
+/// Drops what the text cannot hold.
+pub(crate) fn limit(file: &mut NewFile<'_>, path: &Path) -> Vec<Loss> {
+    match TextStyle::of_path(path) {
+        TextStyle::Pts => file.drop_fields(|_| Some("the columns of PTS have no names; write .csv or .xyz".into())),
+        TextStyle::Plain | TextStyle::Csv => Vec::new(),
+    }
+}
+
+/// Whether the text can hold confidence.
+pub(crate) fn can_hold_side(path: &Path) -> bool {
+    TextStyle::of_path(path) != TextStyle::Pts
+}
+
+/// Writes the file.
+pub(crate) fn write(file: &mut NewFile<'_>, out: &mut Output<'_>, progress: &dyn Progress) -> Result<(), WriteError> {
+    let style = TextStyle::of_path(out.path);
+    let separator = if style == TextStyle::Csv { b',' } else { b' ' };
+    out.write(head(file, style).as_bytes())?;
+    file.write_rows(
+        |row, out| {
+            row.push_coordinates(file.coordinates, separator, out);
+            for value in row.normal.iter().flat_map(glam::Vec3::to_array) {
+                out.push(separator);
+                ValueType::Text.write(value, out);
+            }
+            if let Some(confidence) = row.confidence {
+                out.push(separator);
+                ValueType::Text.write(share_of(confidence), out);
+                out.push(separator);
+                ValueType::Text.write_flag(confidence > normend_core::confidence::UNDECIDED, out);
+            }
+            for cell in row.cells {
+                out.push(separator);
+                cell.push_text(out);
+            }
+            out.push(b'\n');
+        },
+        out,
+        progress,
+    )
+}
+
+/// What stands before the rows.
+fn head(file: &NewFile<'_>, style: TextStyle) -> String {
+    let n_values = if file.has_confidence() {
+        SIDE.end
+    } else if file.normals.is_some() {
+        SIDE.start
+    } else {
+        3
+    };
+    let mut names: Vec<String> = VALUE_NAMES[..n_values].iter().map(|&name| name.to_owned()).collect();
+    names.extend(plain_names(&file.fields, &VALUE_NAMES));
+    match style {
+        TextStyle::Plain if names.len() <= SIDE.start => String::new(),
+        TextStyle::Plain => format!("# {}\n", names.join(" ")),
+        TextStyle::Pts => format!("{}\n", file.n_rows),
+        TextStyle::Csv => names.join(",") + "\n",
+    }
+}

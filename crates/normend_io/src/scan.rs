@@ -1,0 +1,203 @@
+//! A scan: the points of a file, and the file itself so that it can be written again.
+
+use std::fmt;
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+
+use glam::Vec3;
+use normend_core::evidence::Station;
+use normend_core::progress::Part;
+use normend_core::{PointCloud, Progress};
+
+use crate::error::{ReadError, Stop};
+use crate::format::{FileFormat, recognize};
+use crate::recipe::ScanIdentity;
+use crate::table::{Layout, read_points};
+use crate::{ply, xyz};
+
+/// A scan as it was read: the points, and the file itself so that it can be written again with other normals.
+#[derive(Clone)]
+pub struct Scan {
+    /// The finite points.
+    pub cloud: Arc<PointCloud>,
+    /// The file's normals by point, of any length (zero where not finite), if it has any.
+    pub given_normals: Option<Arc<Vec<Vec3>>>,
+    /// The file's row of each point, ascending; `None` when every row is a point.
+    pub rows: Option<Arc<Vec<u32>>>,
+    /// Rows that are left out because a coordinate is not finite.
+    pub n_left_out: usize,
+    /// What it was read as.
+    pub format: FileFormat,
+    pub(crate) file: Arc<SourceFile>,
+}
+
+/// The file that a scan was read from.
+pub(crate) struct SourceFile {
+    path: Option<PathBuf>,
+    /// The file's bytes; of a file that is packed, what its layout unpacked them to.
+    pub bytes: Vec<u8>,
+    pub layout: Box<dyn Layout>,
+    /// Size of the file in bytes.
+    n_bytes: u64,
+    /// BLAKE3 of the file, once it was asked for.
+    hash: OnceLock<[u8; 32]>,
+}
+
+/// Reads a scan; the format is recognized by content, then by extension. Takes no more than the file's
+/// rows unpacked, and what is returned.
+///
+/// # Errors
+/// [`ReadError`]; its message names the file, the place, the reason and what to do.
+pub fn read(path: &Path, progress: &dyn Progress) -> Result<Scan, ReadError> {
+    progress.stage("Reading");
+    let bytes = read_file(path, &Part::new(progress, 0.0..0.3))?;
+    let name = path.display().to_string();
+    read_content(bytes, &name, Some(path), &Part::new(progress, 0.3..1.0))
+}
+
+/// Reads a scan from memory; `name` stands for the path in messages and for the extension.
+///
+/// # Errors
+/// [`ReadError`], as [`read`].
+pub fn read_bytes(bytes: Vec<u8>, name: &str, progress: &dyn Progress) -> Result<Scan, ReadError> {
+    progress.stage("Reading");
+    read_content(bytes, name, None, progress)
+}
+
+pub(crate) fn read_file(path: &Path, progress: &dyn Progress) -> Result<Vec<u8>, ReadError> {
+    const BLOCK: u64 = 8 << 20;
+    let fail = |source| ReadError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    // Before it is opened: opening a pipe waits until somebody writes into it.
+    let metadata = fs::metadata(path).map_err(fail)?;
+    if metadata.is_dir() {
+        return Err(fail(io::ErrorKind::IsADirectory.into()));
+    }
+    if !metadata.is_file() {
+        return Err(fail(io::Error::other(
+            "this is a device or a pipe, not a file: save it as a file first",
+        )));
+    }
+    let mut file = File::open(path).map_err(fail)?;
+    let n_bytes = metadata.len();
+    let mut bytes = Vec::new();
+    let n_reserved = usize::try_from(n_bytes).map_err(|_| fail(io::ErrorKind::OutOfMemory.into()))?;
+    bytes
+        .try_reserve_exact(n_reserved)
+        .map_err(|_| fail(io::ErrorKind::OutOfMemory.into()))?;
+    // A file that grows meanwhile is read as long as it was.
+    while (bytes.len() as u64) < n_bytes {
+        let n_wanted = BLOCK.min(n_bytes - bytes.len() as u64);
+        let n_read = (&mut file).take(n_wanted).read_to_end(&mut bytes).map_err(fail)?;
+        if n_read == 0 {
+            break;
+        }
+        progress.report(bytes.len() as f32 / n_bytes as f32)?;
+    }
+    Ok(bytes)
+}
+
+fn read_content(bytes: Vec<u8>, name: &str, path: Option<&Path>, progress: &dyn Progress) -> Result<Scan, ReadError> {
+    let in_file = |stop: Stop| stop.in_file(name);
+    let format = recognize(&bytes, Path::new(name)).map_err(|broken| in_file(broken.into()))?;
+    let n_bytes = bytes.len() as u64;
+    let Decoded { bytes, layout, hash } = decode(format, bytes, &Part::new(progress, 0.0..0.5)).map_err(in_file)?;
+    let points = read_points(layout.as_ref(), &bytes, &Part::new(progress, 0.5..1.0)).map_err(in_file)?;
+    let n_left_out = layout.table().n_rows - points.cloud.n_points();
+    Ok(Scan {
+        cloud: Arc::new(points.cloud),
+        given_normals: points.normals.map(Arc::new),
+        rows: points.rows.map(Arc::new),
+        n_left_out,
+        format,
+        file: Arc::new(SourceFile {
+            path: path.map(Path::to_owned),
+            bytes,
+            layout,
+            n_bytes,
+            hash,
+        }),
+    })
+}
+
+/// A file whose rows can be found.
+struct Decoded {
+    bytes: Vec<u8>,
+    layout: Box<dyn Layout>,
+    hash: OnceLock<[u8; 32]>,
+}
+
+/// Finds the rows of a file, or unpacks them.
+fn decode(format: FileFormat, bytes: Vec<u8>, progress: &dyn Progress) -> Result<Decoded, Stop> {
+    let layout: Box<dyn Layout> = match format {
+        FileFormat::Ply => Box::new(ply::read(&bytes, progress)?),
+        FileFormat::Xyz => Box::new(xyz::read(&bytes, progress)?),
+    };
+    Ok(Decoded {
+        bytes,
+        layout,
+        hash: OnceLock::new(),
+    })
+}
+
+fn hash(bytes: &[u8]) -> [u8; 32] {
+    *blake3::Hasher::new().update_rayon(bytes).finalize().as_bytes()
+}
+
+impl Scan {
+    /// Where it was read from; `None` for [`read_bytes`].
+    pub fn path(&self) -> Option<&PathBuf> {
+        self.file.path.as_ref()
+    }
+
+    /// What tells this scan from others in recipes; `name` is the file's without folders. The first call hashes the file's bytes
+    /// on all processors; later ones cost nothing.
+    pub fn identity(&self, name: &str) -> ScanIdentity {
+        ScanIdentity {
+            name: name.to_owned(),
+            path: self.path().map(|path| {
+                let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+                path.display().to_string()
+            }),
+            n_bytes: self.file.n_bytes,
+            hash: *self.file.hash.get_or_init(|| hash(&self.file.bytes)),
+            n_points: self.cloud.n_points() as u64,
+        }
+    }
+
+    /// Places that the file says its points were measured from, with the points of each, ascending. O(number of places).
+    pub fn stations(&self) -> Vec<Station> {
+        let table = self.file.layout.table();
+        let end_of = |index: usize| table.frames.get(index + 1).map_or(table.n_rows, |next| next.first_row);
+        let frames = table.frames.iter().enumerate();
+        frames
+            .filter_map(|(index, frame)| {
+                Some(Station {
+                    points: self.point_of_row(frame.first_row)..self.point_of_row(end_of(index)),
+                    position: frame.station?,
+                })
+            })
+            .collect()
+    }
+
+    /// The point that a row of the file is or, when it is none, the next that follows. O(log n).
+    pub(crate) fn point_of_row(&self, row: usize) -> u32 {
+        match &self.rows {
+            Some(rows) => rows.partition_point(|&other| (other as usize) < row) as u32,
+            None => row as u32,
+        }
+    }
+}
+
+impl fmt::Debug for Scan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Scan")
+            .field("n_points", &self.cloud.n_points())
+            .field("format", &self.format)
+            .finish()
+    }
+}

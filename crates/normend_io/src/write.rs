@@ -1,0 +1,204 @@
+//! Writing scans and fresh clouds: whole or not at all, in the format that the target's extension names.
+
+use std::path::{Path, PathBuf};
+
+use glam::{DVec3, Vec3};
+use normend_core::Progress;
+use rayon::prelude::*;
+
+use crate::error::WriteError;
+use crate::format::FileFormat;
+use crate::new_file::{Loss, NewFile, Origin};
+use crate::output::Output;
+use crate::rewrite::RowNormals;
+use crate::save;
+use crate::scan::Scan;
+use crate::table::NewContent;
+use crate::value::Scalar;
+
+/// What is written besides the normals.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct WriteOptions {
+    /// The rule that decided the sides, for the comment line ("farthest along +z up", "as given").
+    pub rule: String,
+    /// Write over the file that was read. Without it that is refused.
+    pub overwrite_input: bool,
+}
+
+impl Scan {
+    /// Writes the file that came in with `normals` (unit, by point of the cloud) to `path`: beside it first, synced,
+    /// renamed. The format is that of `path`'s extension, or the input's ([`FileFormat::of_target`]); in another format than
+    /// the input's goes all that it can hold ([`Self::losses`] names the rest), in text with what the extension asks for: names
+    /// and commas in `.csv`, the number of points in `.pts`. A row that is no point keeps the normal it has, or gets `0 0 1`.
+    ///
+    /// # Errors
+    /// [`WriteError`]; the target is as it was then.
+    pub fn write(
+        &self,
+        normals: &[Vec3],
+        path: &Path,
+        options: &WriteOptions,
+        progress: &dyn Progress,
+    ) -> Result<(), WriteError> {
+        self.write_with_confidence(normals, None, path, options, progress)
+    }
+
+    /// What a file at `path` would not hold of this scan: nothing in the format that came in. O(1).
+    ///
+    /// # Errors
+    /// [`WriteError::Extension`].
+    pub fn losses(&self, path: &Path) -> Result<Vec<Loss>, WriteError> {
+        let format = FileFormat::of_target(path, self.path().map(PathBuf::as_path))?.unwrap_or(self.format);
+        if format == self.format {
+            return Ok(Vec::new());
+        }
+        let mut file = NewFile::of_file(self.file.layout.as_ref(), &self.file.bytes, None);
+        let besides = self.file.layout.besides_rows(&self.file.bytes);
+        let mut losses: Vec<Loss> = besides
+            .into_iter()
+            .map(|what| Loss {
+                what,
+                why: format!("{} from {} holds points only", format.label(), self.format.label()),
+            })
+            .collect();
+        losses.extend(format.limit(&mut file, path));
+        Ok(losses)
+    }
+
+    /// Like [`Self::write`], with how sure each normal is of its side (by point, in units of 1/255) when it is given: as
+    /// `float confidence` in 0..=1, and `uchar oriented`, 0 where that is no more than a guess. Both stand after the normal, or
+    /// where the file has such values already. A row that is no point keeps what it has, or gets 0.
+    ///
+    /// # Errors
+    /// [`WriteError`]; the target is as it was then.
+    pub fn write_with_confidence(
+        &self,
+        normals: &[Vec3],
+        confidence: Option<&[u8]>,
+        path: &Path,
+        options: &WriteOptions,
+        progress: &dyn Progress,
+    ) -> Result<(), WriteError> {
+        progress.stage("Writing");
+        let format = FileFormat::of_target(path, self.path().map(PathBuf::as_path))?.unwrap_or(self.format);
+        check_normals(normals, self.cloud.n_points())?;
+        if let Some(confidence) = confidence {
+            if confidence.len() != normals.len() {
+                return Err(WriteError::Count {
+                    n_normals: confidence.len(),
+                    n_points: normals.len(),
+                });
+            }
+            let can_hold = match format == self.format {
+                true => self.file.layout.can_hold_side(),
+                false => format.can_hold_side(path),
+            };
+            if !can_hold {
+                return Err(WriteError::NoConfidence { path: path.to_owned() });
+            }
+        }
+        if !options.overwrite_input && self.path().is_some_and(|input| save::is_same_file(input, path)) {
+            return Err(WriteError::OverInput { path: path.to_owned() });
+        }
+        let layout = self.file.layout.as_ref();
+        let bytes = &self.file.bytes[..];
+        let normals = RowNormals::new(normals, confidence, self.rows.as_ref().map(|rows| rows.as_slice()));
+        let comment = comment(&options.rule);
+        save::replace(path, |file| {
+            let mut out = Output { path, file };
+            if format == self.format {
+                let content = NewContent {
+                    normals,
+                    comment: &comment,
+                };
+                return layout.rewrite(bytes, &content, &mut out, progress);
+            }
+            let mut file = NewFile::of_file(layout, bytes, Some(normals));
+            file.comment = Some(&comment);
+            format.limit(&mut file, path);
+            format.write_new(&mut file, &mut out, progress)
+        })
+    }
+}
+
+/// The comment line that names program, version and rule.
+fn comment(rule: &str) -> String {
+    let rule = rule.replace(char::is_control, " ");
+    format!("Normend {}: normals oriented, rule: {rule}", env!("CARGO_PKG_VERSION"))
+}
+
+fn check_normals(normals: &[Vec3], n_points: usize) -> Result<(), WriteError> {
+    if normals.len() != n_points {
+        return Err(WriteError::Count {
+            n_normals: normals.len(),
+            n_points,
+        });
+    }
+    let is_unit = |normal: &Vec3| (normal.length_squared() - 1.0).abs() < 0.01;
+    match normals.par_iter().position_first(|normal| !is_unit(normal)) {
+        None => Ok(()),
+        Some(point) => Err(WriteError::NotUnit {
+            point,
+            normal: normals[point],
+        }),
+    }
+}
+
+/// Positions of a cloud that did not come from a file, in the file's coordinates.
+#[derive(Clone, Copy, Debug)]
+pub enum Positions<'a> {
+    /// Written as `float`.
+    Float(&'a [Vec3]),
+    /// Written as `double`.
+    Double(&'a [DVec3]),
+}
+
+/// Writes a fresh cloud, with `n` unit normals or without, as [`Scan::write`] does: binary little-endian PLY, or text
+/// when the extension says so ([`FileFormat::of_target`]). A file that is there is replaced.
+///
+/// # Errors
+/// [`WriteError`]; the target is as it was then.
+pub fn write_points(
+    path: &Path,
+    positions: Positions<'_>,
+    normals: Option<&[Vec3]>,
+    progress: &dyn Progress,
+) -> Result<(), WriteError> {
+    progress.stage("Writing");
+    let format = FileFormat::of_target(path, None)?;
+    let n_points = match positions {
+        Positions::Float(positions) => positions.len(),
+        Positions::Double(positions) => positions.len(),
+    };
+    if let Some(normals) = normals {
+        check_normals(normals, n_points)?;
+    }
+    let mut file = NewFile {
+        n_rows: n_points,
+        origin: Origin::Positions(&|row| match positions {
+            Positions::Float(positions) => positions[row].as_dvec3(),
+            Positions::Double(positions) => positions[row],
+        }),
+        coordinates: match positions {
+            Positions::Float(_) => Scalar::Float,
+            Positions::Double(_) => Scalar::Double,
+        },
+        normals: normals.map(|normals| RowNormals::new(normals, None, None)),
+        fields: Vec::new(),
+        comment: None,
+    };
+    let format = format.unwrap_or(FileFormat::Ply);
+    save::replace(path, |out| {
+        let mut out = Output { path, file: out };
+        format.write_new(&mut file, &mut out, progress)
+    })
+}
+
+/// Writes `bytes` to `path` as [`Scan::write`] writes scans, whole or not at all: for pictures and the like. A file that is
+/// there is replaced.
+///
+/// # Errors
+/// [`WriteError`]; the target is as it was then.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    save::replace(path, |file| Output { path, file }.write(bytes))
+}
