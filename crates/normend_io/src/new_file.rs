@@ -99,7 +99,7 @@ pub(crate) struct NewRow<'a> {
     pub position: DVec3,
     /// The coordinates as the source has them, when these are the scan's.
     pub coordinates: Option<[Cell<'a>; 3]>,
-    /// Unit; `None` when no normals are written.
+    /// Unit, or what the source has for a row that is no point; `None` when no normals are written.
     pub normal: Option<Vec3>,
     /// In units of 1/255; `None` when it is not written.
     pub confidence: Option<u8>,
@@ -285,7 +285,7 @@ impl<'a> NewFile<'a> {
                 // A row that is no point is not sure of anything.
                 None => normals.has_confidence().then_some(0),
             };
-            Some((point.map_or(NO_NORMAL, |point| normals.normal_of(point)), confidence))
+            Some((point.map(|point| normals.normal_of(point)), confidence))
         };
         match self.origin {
             Origin::Positions(position) => {
@@ -294,7 +294,7 @@ impl<'a> NewFile<'a> {
                     take(&NewRow {
                         position: position(row),
                         coordinates: None,
-                        normal,
+                        normal: normal.map(|normal| normal.unwrap_or(NO_NORMAL)),
                         confidence: confidence.flatten(),
                         cells: &[],
                     });
@@ -346,10 +346,18 @@ impl<'a> NewFile<'a> {
                     }
                     let frame = frames.next().flatten();
                     let (normal, confidence) = normal_of_row().unzip();
+                    // What a row that is no point has.
+                    let given = || {
+                        let part = |slot: usize| table.types[slot].read(spans[slot].of(bytes));
+                        let [x, y, z] = [part(NORMAL.start)?, part(NORMAL.start + 1)?, part(NORMAL.start + 2)?];
+                        let given = DVec3::new(x, y, z).as_vec3();
+                        let in_scan = frame.map_or(given, |frame| frame.normal_from_stored(given));
+                        (table.has_normals && in_scan.is_finite()).then_some(in_scan)
+                    };
                     take(&NewRow {
                         position: frame.map_or(stored, |frame| frame.from_stored.transform_point3(stored)),
                         coordinates: frame.is_none().then_some(coordinates),
-                        normal,
+                        normal: normal.map(|normal| normal.or_else(given).unwrap_or(NO_NORMAL)),
                         confidence: confidence.flatten(),
                         cells: &cells,
                     });
