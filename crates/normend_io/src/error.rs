@@ -44,6 +44,15 @@ pub enum WriteError {
         /// The target.
         path: PathBuf,
     },
+    /// The target is the file that was read, with another content by now.
+    #[error(
+        "{} was changed by another program after it was read: open it again, choose another name, or allow the changes to be lost",
+        path.display()
+    )]
+    InputChanged {
+        /// The target.
+        path: PathBuf,
+    },
     /// The target's name promises a format that is not written.
     #[error("{} cannot be written: Normend writes {}; choose a name that ends with one of these", path.display(), written())]
     Extension {

@@ -34,6 +34,8 @@ mod output;
 
 mod save;
 
+mod on_disk;
+
 mod write;
 
 mod stations;
@@ -46,6 +48,7 @@ mod confidence_tests;
 pub use error::{Broken, Place, ReadError, WriteError};
 pub use format::FileFormat;
 pub use new_file::Loss;
+pub use save::{is_same_file, n_other_names};
 pub use scan::{Scan, read, read_bytes};
-pub use stations::read_stations;
+pub use stations::{read_stations, stations_of_bytes};
 pub use write::{Positions, WriteOptions, write_bytes, write_points};

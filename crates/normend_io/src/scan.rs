@@ -13,6 +13,7 @@ use normend_core::{PointCloud, Progress};
 
 use crate::error::{ReadError, Stop};
 use crate::format::{FileFormat, recognize};
+use crate::on_disk::{Content, OnDisk};
 use crate::recipe::ScanIdentity;
 use crate::table::{Layout, read_points};
 use crate::{ply, xyz};
@@ -43,6 +44,7 @@ pub(crate) struct SourceFile {
     n_bytes: u64,
     /// BLAKE3 of the file, once it was asked for.
     hash: OnceLock<[u8; 32]>,
+    pub on_disk: OnDisk,
 }
 
 /// Reads a scan; the format is recognized by content, then by extension. Takes no more than the file's
@@ -52,9 +54,11 @@ pub(crate) struct SourceFile {
 /// [`ReadError`]; its message names the file, the place, the reason and what to do.
 pub fn read(path: &Path, progress: &dyn Progress) -> Result<Scan, ReadError> {
     progress.stage("Reading");
+    // Before it is read: what changes meanwhile is a change.
+    let source = Some((path, OnDisk::of(path)));
     let bytes = read_file(path, &Part::new(progress, 0.0..0.3))?;
     let name = path.display().to_string();
-    read_content(bytes, &name, Some(path), &Part::new(progress, 0.3..1.0))
+    read_content(bytes, &name, source, &Part::new(progress, 0.3..1.0))
 }
 
 /// Reads a scan from memory; `name` stands for the path in messages and for the extension.
@@ -101,13 +105,19 @@ pub(crate) fn read_file(path: &Path, progress: &dyn Progress) -> Result<Vec<u8>,
     Ok(bytes)
 }
 
-fn read_content(bytes: Vec<u8>, name: &str, path: Option<&Path>, progress: &dyn Progress) -> Result<Scan, ReadError> {
+fn read_content(
+    bytes: Vec<u8>,
+    name: &str,
+    source: Option<(&Path, OnDisk)>,
+    progress: &dyn Progress,
+) -> Result<Scan, ReadError> {
     let in_file = |stop: Stop| stop.in_file(name);
     let format = recognize(&bytes, Path::new(name)).map_err(|broken| in_file(broken.into()))?;
     let n_bytes = bytes.len() as u64;
     let Decoded { bytes, layout, hash } = decode(format, bytes, &Part::new(progress, 0.0..0.5)).map_err(in_file)?;
     let points = read_points(layout.as_ref(), &bytes, &Part::new(progress, 0.5..1.0)).map_err(in_file)?;
     let n_left_out = layout.table().n_rows - points.cloud.n_points();
+    let (path, on_disk) = source.unzip();
     Ok(Scan {
         cloud: Arc::new(points.cloud),
         given_normals: points.normals.map(Arc::new),
@@ -120,6 +130,7 @@ fn read_content(bytes: Vec<u8>, name: &str, path: Option<&Path>, progress: &dyn 
             layout,
             n_bytes,
             hash,
+            on_disk: on_disk.unwrap_or_default(),
         }),
     })
 }
@@ -154,17 +165,28 @@ impl Scan {
         self.file.path.as_ref()
     }
 
-    /// What tells this scan from others in recipes; `name` is the file's without folders. The first call hashes the file's bytes
-    /// on all processors; later ones cost nothing.
+    /// Whether another program has changed the file since it was read, or since it was written over. One look at the disk, not into
+    /// the file.
+    pub fn is_changed_on_disk(&self) -> bool {
+        self.path().is_some_and(|path| self.file.on_disk.is_changed(path))
+    }
+
+    /// What tells this scan from others in recipes; `name` is the file's without folders. That is the content that was read or, once
+    /// that was written over, the one that took its place: it has the same points. The first call hashes the file's bytes on all
+    /// processors; later ones cost nothing.
     pub fn identity(&self, name: &str) -> ScanIdentity {
+        let Content { n_bytes, hash } = self.file.on_disk.content().unwrap_or_else(|| Content {
+            n_bytes: self.file.n_bytes,
+            hash: *self.file.hash.get_or_init(|| hash(&self.file.bytes)),
+        });
         ScanIdentity {
             name: name.to_owned(),
             path: self.path().map(|path| {
                 let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
                 path.display().to_string()
             }),
-            n_bytes: self.file.n_bytes,
-            hash: *self.file.hash.get_or_init(|| hash(&self.file.bytes)),
+            n_bytes,
+            hash,
             n_points: self.cloud.n_points() as u64,
         }
     }

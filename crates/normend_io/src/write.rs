@@ -23,6 +23,8 @@ pub struct WriteOptions {
     pub rule: String,
     /// Write over the file that was read. Without it that is refused.
     pub overwrite_input: bool,
+    /// Write over it even when another program has changed it since, so that those changes are lost.
+    pub overwrite_changed: bool,
 }
 
 impl Scan {
@@ -97,14 +99,20 @@ impl Scan {
                 return Err(WriteError::NoConfidence { path: path.to_owned() });
             }
         }
-        if !options.overwrite_input && self.path().is_some_and(|input| save::is_same_file(input, path)) {
-            return Err(WriteError::OverInput { path: path.to_owned() });
+        let is_input = || self.path().is_some_and(|input| save::is_same_file(input, path));
+        if is_input() {
+            if !options.overwrite_input {
+                return Err(WriteError::OverInput { path: path.to_owned() });
+            }
+            if !options.overwrite_changed && self.is_changed_on_disk() {
+                return Err(WriteError::InputChanged { path: path.to_owned() });
+            }
         }
         let layout = self.file.layout.as_ref();
         let bytes = &self.file.bytes[..];
         let normals = RowNormals::new(normals, confidence, self.rows.as_ref().map(|rows| rows.as_slice()));
         let comment = comment(&options.rule);
-        save::replace(path, |file| {
+        let written = save::place(path, |file| {
             let mut out = Output { path, file };
             if format == self.format {
                 let content = NewContent {
@@ -117,7 +125,13 @@ impl Scan {
             file.comment = Some(&comment);
             format.limit(&mut file, path);
             format.write_new(&mut file, &mut out, progress)
-        })
+        })?;
+        // Another name of the input (a hard link) is a file of its own by now.
+        if is_input() {
+            // Where it cannot be read again, a journal of this scan is not taken for one of the new content. It is written all the same.
+            let _ = self.file.on_disk.replaced_by(written);
+        }
+        Ok(())
     }
 }
 
