@@ -13,6 +13,8 @@ pub mod progress;
 
 pub mod point_cloud;
 
+mod copies;
+
 pub mod neighbors;
 
 pub mod normals;

@@ -12,7 +12,7 @@ use std::cmp::Ordering::Equal;
 use std::num::NonZero;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use glam::Vec3;
+use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 
@@ -43,8 +43,7 @@ impl Neighbors {
         progress.report(0.0)?;
         let places = Places::new(cloud);
         progress.report(0.08)?;
-        let tree = ImmutableKdTree::<f32, 3>::new_from_slice_parallel(&places.positions)
-            .expect("ids fit into u32, as PointCloud checks, and arena leaves hold any number of equal coordinates");
+        let tree = Tree::new(&places.positions);
 
         // Tasks follow the places, which is kind to caches; rows are in file order, so tasks write all over them.
         let rows: Vec<AtomicU32> = (0..n_points * k).map(|_| AtomicU32::new(0)).collect();
@@ -104,7 +103,7 @@ pub(crate) fn morton_order(cloud: &PointCloud) -> Vec<u32> {
         })
         .collect();
     // Within a cell by coordinates, so that equal positions follow each other.
-    let coordinates = |id: u32| positions[id as usize];
+    let coordinates = |id: u32| cloud.relative(id as usize);
     sorted.par_sort_unstable_by(|a, b| {
         a.0.cmp(&b.0)
             .then_with(|| compare(coordinates(a.1), coordinates(b.1)))
@@ -118,40 +117,111 @@ const PLACES: usize = 1024;
 
 /// The distinct positions, along a Morton curve, and the points at each.
 struct Places {
-    /// Positions scaled by a power of two so that squared distances stay within `f32`.
-    positions: Vec<[f32; 3]>,
+    positions: Positions,
     /// Point ids, place by place, ascending in each.
     ids: Vec<u32>,
-    /// `positions.len() + 1` offsets into `ids`.
+    /// An offset into `ids` for each place, and one more.
     starts: Vec<u32>,
+}
+
+/// Positions scaled by a power of two so that squared distances stay within `f32`.
+enum Positions {
+    Single(Vec<[f32; 3]>),
+    /// With the remainders of the cloud.
+    Double(Vec<[f64; 3]>),
+}
+
+/// A kd-tree over [`Positions`].
+enum Tree {
+    Single(ImmutableKdTree<f32, 3>),
+    Double(ImmutableKdTree<f64, 3>),
+}
+
+impl Tree {
+    fn new(positions: &Positions) -> Self {
+        const ANY: &str =
+            "ids fit into u32, as PointCloud checks, and arena leaves hold any number of equal coordinates";
+        match positions {
+            Positions::Single(positions) => {
+                Self::Single(ImmutableKdTree::new_from_slice_parallel(positions).expect(ANY))
+            }
+            Positions::Double(positions) => {
+                Self::Double(ImmutableKdTree::new_from_slice_parallel(positions).expect(ANY))
+            }
+        }
+    }
+
+    /// Calls `visit` with each of the `count` places nearest to `place` and its squared distance.
+    fn nearest(&self, positions: &Positions, place: usize, count: NonZero<usize>, mut visit: impl FnMut(u32, f64)) {
+        match (self, positions) {
+            (Self::Single(tree), Positions::Single(positions)) => {
+                let query = tree.query(&positions[place]);
+                let found = query.nearest_n::<SquaredEuclidean<f32>>(count).execute();
+                found.iter().for_each(|found| visit(found.item, found.distance.into()));
+            }
+            (Self::Double(tree), Positions::Double(positions)) => {
+                let query = tree.query(&positions[place]);
+                let found = query.nearest_n::<SquaredEuclidean<f64>>(count).execute();
+                found.iter().for_each(|found| visit(found.item, found.distance));
+            }
+            _ => unreachable!("the tree is made of these positions"),
+        }
+    }
+
+    /// Calls `visit` with each place within a squared distance of `place`.
+    fn within(&self, positions: &Positions, place: usize, squared_distance: f64, mut visit: impl FnMut(u32)) {
+        match (self, positions) {
+            (Self::Single(tree), Positions::Single(positions)) => {
+                let query = tree
+                    .query(&positions[place])
+                    .within::<SquaredEuclidean<f32>>(squared_distance as f32);
+                query.unsorted().execute().iter().for_each(|found| visit(found.item));
+            }
+            (Self::Double(tree), Positions::Double(positions)) => {
+                let query = tree
+                    .query(&positions[place])
+                    .within::<SquaredEuclidean<f64>>(squared_distance);
+                query.unsorted().execute().iter().for_each(|found| visit(found.item));
+            }
+            _ => unreachable!("the tree is made of these positions"),
+        }
+    }
 }
 
 impl Places {
     fn new(cloud: &PointCloud) -> Self {
-        let positions = cloud.positions();
         let ids = morton_order(cloud);
         let scale = power_of_two_near(cloud.diagonal()).recip();
-        let mut places = Self {
-            positions: Vec::with_capacity(ids.len()),
-            ids: Vec::new(),
-            starts: Vec::with_capacity(ids.len() + 1),
-        };
-        let mut previous = Vec3::NAN;
+        let mut starts = Vec::with_capacity(ids.len() + 1);
+        let mut previous = DVec3::NAN;
         for (start, &id) in ids.iter().enumerate() {
-            let position = positions[id as usize];
+            let position = cloud.relative(id as usize);
             if position != previous {
-                places.starts.push(start as u32);
-                places.positions.push((position * scale).to_array());
+                starts.push(start as u32);
                 previous = position;
             }
         }
-        places.starts.push(ids.len() as u32);
-        places.ids = ids;
-        places
+        let firsts = starts.par_iter().map(|&start| ids[start as usize] as usize);
+        let positions = if cloud.has_remainders() {
+            let scale = f64::from(scale);
+            Positions::Double(firsts.map(|id| (cloud.relative(id) * scale).to_array()).collect())
+        } else {
+            Positions::Single(firsts.map(|id| (cloud.positions()[id] * scale).to_array()).collect())
+        };
+        starts.push(ids.len() as u32);
+        Self { positions, ids, starts }
     }
 
     fn n(&self) -> usize {
-        self.positions.len()
+        self.starts.len() - 1
+    }
+
+    /// The scaled position of a place.
+    fn position(&self, place: usize) -> DVec3 {
+        match &self.positions {
+            Positions::Single(positions) => DVec3::from_array(positions[place].map(f64::from)),
+            Positions::Double(positions) => DVec3::from_array(positions[place]),
+        }
     }
 
     /// The points at `place`, ascending.
@@ -160,8 +230,7 @@ impl Places {
     }
 
     fn squared_distance(&self, a: usize, b: usize) -> f64 {
-        let (a, b) = (self.positions[a], self.positions[b]);
-        (Vec3::from(a).as_dvec3() - Vec3::from(b).as_dvec3()).length_squared()
+        self.position(a).distance_squared(self.position(b))
     }
 }
 
@@ -174,7 +243,7 @@ struct Found {
 
 /// Room for one thread's searches.
 struct Search<'a> {
-    tree: &'a ImmutableKdTree<f32, 3>,
+    tree: &'a Tree,
     places: &'a Places,
     k: usize,
     /// Squared distance and index of the places near the one searched around.
@@ -185,7 +254,7 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(tree: &'a ImmutableKdTree<f32, 3>, places: &'a Places, k: usize) -> Self {
+    fn new(tree: &'a Tree, places: &'a Places, k: usize) -> Self {
         Self {
             tree,
             places,
@@ -197,38 +266,30 @@ impl<'a> Search<'a> {
 
     /// Fills `found` for the points at `place`.
     fn find(&mut self, place: usize) {
-        let query = &self.places.positions[place];
+        let Self { tree, places, near, .. } = self;
         // One place more than k and the place itself: when that one is clearly farther, no tie was cut.
-        let asked = (self.k + 2).min(self.places.n());
-        let mut farthest = 0.0_f32;
-        self.near.clear();
-        for result in self
-            .tree
-            .query(query)
-            .nearest_n::<SquaredEuclidean<f32>>(at_least_one(asked))
-            .execute()
-        {
-            farthest = farthest.max(result.distance);
-            let near = result.item as usize;
-            self.near.push((self.places.squared_distance(place, near), result.item));
-        }
+        let asked = (self.k + 2).min(places.n());
+        let mut farthest = 0.0_f64;
+        near.clear();
+        tree.nearest(
+            &places.positions,
+            place,
+            at_least_one(asked),
+            |other, squared_distance| {
+                farthest = farthest.max(squared_distance);
+                near.push((places.squared_distance(place, other as usize), other));
+            },
+        );
         self.sort_near();
         let needed = self.needed_distance();
-        let complete = asked == self.places.n() || f64::from(farthest) * (1.0 - ROUNDING) - UNDERFLOW > needed;
+        let complete = asked == self.places.n() || farthest * (1.0 - ROUNDING) - UNDERFLOW > needed;
         if !complete {
-            let radius = (needed * (1.0 + ROUNDING) + UNDERFLOW) as f32;
-            self.near.clear();
-            let places = self.places;
-            let results = self
-                .tree
-                .query(query)
-                .within::<SquaredEuclidean<f32>>(radius)
-                .unsorted()
-                .execute();
-            self.near.extend(results.iter().map(|result| {
-                let near = result.item as usize;
-                (places.squared_distance(place, near), result.item)
-            }));
+            let reach = needed * (1.0 + ROUNDING) + UNDERFLOW;
+            let Self { tree, places, near, .. } = self;
+            near.clear();
+            tree.within(&places.positions, place, reach, |other| {
+                near.push((places.squared_distance(place, other as usize), other));
+            });
             self.sort_near();
         }
         self.take_points(needed);
@@ -282,8 +343,8 @@ fn at_least_one(count: usize) -> NonZero<usize> {
 }
 
 /// By x, then y, then z; positions are finite, and 0 equals -0.
-fn compare(a: Vec3, b: Vec3) -> std::cmp::Ordering {
-    let axis = |a: f32, b: f32| a.partial_cmp(&b).unwrap_or(Equal);
+fn compare(a: DVec3, b: DVec3) -> std::cmp::Ordering {
+    let axis = |a: f64, b: f64| a.partial_cmp(&b).unwrap_or(Equal);
     axis(a.x, b.x).then(axis(a.y, b.y)).then(axis(a.z, b.z))
 }
 
@@ -312,7 +373,7 @@ fn morton(x: u64, y: u64, z: u64) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
+    use glam::Vec3;
     use proptest::prelude::*;
 
     use super::*;

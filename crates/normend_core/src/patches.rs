@@ -14,6 +14,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use crate::copies::Members;
 use crate::{Change, SpanningTree};
 
 /// One level of an agglomeration. Level 0 has the points as its clusters.
@@ -78,6 +79,8 @@ pub struct Offer {
 #[derive(Clone, Debug)]
 pub struct Patches {
     n_points: usize,
+    /// The first of the patches of several points are those of points in one place: so many. Only whole places are offered.
+    n_places: usize,
     /// By node the node it is part of, itself for the last. Nodes are first the points, then patches of several points;
     /// a node comes before the one it is part of.
     parents: Vec<u32>,
@@ -122,6 +125,49 @@ impl Patches {
         builder.finish(tree)
     }
 
+    /// The patches of all points of a cloud from those of its places; `tree` is over all points.
+    pub(crate) fn with_copies(&self, places: &Members, tree: &SpanningTree) -> Self {
+        let n_points = places.n_points();
+        // Places of several points become patches, before all others.
+        let mut n_places = 0;
+        let mut nodes = vec![0_u32; self.parents.len()];
+        for place in 0..self.n_points {
+            let first = places.first(place as u32);
+            nodes[place] = match places.copies(place as u32) {
+                [] => first,
+                _ => {
+                    n_places += 1;
+                    (n_points + n_places - 1) as u32
+                }
+            };
+        }
+        for (node, patch) in nodes[self.n_points..].iter_mut().zip(n_points + n_places..) {
+            *node = patch as u32;
+        }
+        let mut parents: Vec<u32> = (0..(n_points + n_places + self.n_patches()) as u32).collect();
+        let mut strengths = vec![0_i16; parents.len()];
+        for (old, &node) in nodes.iter().enumerate() {
+            parents[node as usize] = nodes[self.parents[old] as usize];
+            strengths[node as usize] = self.strengths[old];
+        }
+        for place in (0..self.n_points).filter(|&place| places.of(place).len() > 1) {
+            for &point in places.of(place) {
+                parents[point as usize] = nodes[place];
+                strengths[point as usize] = self.strengths[place];
+            }
+        }
+        let builder = Builder {
+            n_points,
+            parents,
+            strengths,
+            clusters: Vec::new(),
+        };
+        Self {
+            n_places,
+            ..builder.finish(tree)
+        }
+    }
+
     /// The number of patches of several points.
     pub fn n_patches(&self) -> usize {
         self.sizes.len()
@@ -133,9 +179,13 @@ impl Patches {
         self.starts[point as usize]
     }
 
-    /// The patches that hold `point`: the point alone first, its component last.
+    /// The patches that hold `point`: the point alone first, or all points of its place if there are several, its component last.
     pub fn around(&self, point: u32) -> impl Iterator<Item = Patch> {
-        std::iter::successors(Some(point), |&node| self.parent(node)).map(|node| self.patch(node))
+        let first = match self.parents[point as usize] {
+            above if (above as usize) < self.n_points + self.n_places => above,
+            _ => point,
+        };
+        std::iter::successors(Some(first), |&node| self.parent(node)).map(|node| self.patch(node))
     }
 
     /// All patches with the index of the one that each is part of, itself for a component. The points come first, in the order
@@ -389,6 +439,7 @@ impl Builder {
         }
         Patches {
             n_points,
+            n_places: 0,
             parents,
             starts,
             sizes,

@@ -1,4 +1,8 @@
-//! Finite positions in `f32` around an `f64` origin.
+//! Finite positions in `f32` around an `f64` origin, with what `f32` rounds away where that matters.
+//!
+//! `f32` has 24 bits, which are spent on the extent: 0.03 mm in a scan of 1 km, 4 mm in one of 100 km. Where points stand nearly as
+//! close as that, neighbors and normals would be those of the rounding. Such a cloud keeps the next 8 bits too, as *remainders*:
+//! [`PointCloud::offset`] and [`PointCloud::relative`] are what neighbors, normals and edges are computed from, everywhere.
 
 use std::ops::RangeInclusive;
 
@@ -7,12 +11,14 @@ use rayon::prelude::*;
 
 /// The points of a scan: finite positions, in the file's order, relative to an origin in the file's coordinates.
 ///
-/// A file point is `origin + position`. Points of the file that are not finite are not in the cloud; who reads the file
-/// keeps them (see `normend_io::Scan::rows`).
+/// A file point is `origin + position`, up to rounding. Points of the file that are not finite are not in the cloud; who reads the
+/// file keeps them (see `normend_io::Scan::rows`). 12 bytes a point, and 3 more with remainders.
 #[derive(Clone, Debug)]
 pub struct PointCloud {
     origin: DVec3,
     positions: Vec<Vec3>,
+    /// By point what its position lacks, in [`Self::remainder_step`]; empty where `f32` is fine enough.
+    remainders: Vec<[i8; 3]>,
     min: Vec3,
     max: Vec3,
 }
@@ -36,7 +42,10 @@ pub enum PointCloudError {
         n_points: usize,
     },
     /// The extent is so small or so large that squared distances leave the range of `f32`.
-    #[error("the points span {extent:e} units; Normend works with spans between 1e-15 and 1e15: change the unit")]
+    #[error(
+        "the points span {extent:e} units; Normend works with spans between 1e-15 and 1e15: change the unit, or take out points that are \
+         far from all others"
+    )]
     Extent {
         /// Diagonal of the bounding box.
         extent: f64,
@@ -68,6 +77,7 @@ impl PointCloud {
         Ok(Self {
             origin,
             positions,
+            remainders: Vec::new(),
             min,
             max,
         })
@@ -94,10 +104,14 @@ impl PointCloud {
             |a, b| (a.0.min(b.0), a.1.max(b.1)),
         );
         let origin = Self::origin_for(min, max)?;
-        Self::new(
-            origin,
-            points.par_iter().map(|&point| (point - origin).as_vec3()).collect(),
-        )
+        let positions = points.par_iter().map(|&point| (point - origin).as_vec3()).collect();
+        let mut cloud = Self::new(origin, positions)?;
+        let is_rounded = |(id, &point): (usize, &DVec3)| cloud.remainder(id, point) != [0; 3];
+        if points.par_iter().enumerate().any(is_rounded) && cloud.is_coarse() {
+            let remainders = (points.par_iter().enumerate()).map(|(id, &point)| cloud.remainder(id, point));
+            cloud.remainders = remainders.collect();
+        }
+        Ok(cloud)
     }
 
     /// The origin that [`Self::from_f64`] chooses for points with this bounding box, in the file's coordinates.
@@ -126,6 +140,114 @@ impl PointCloud {
         ))
     }
 
+    /// Whether points stand so close that `f32`, over the extent of the cloud, rounds away what matters: one in a hundred or more
+    /// shares a cell of [`COARSE`] steps with another one. Where not, normals are off by less than a twentieth of a degree for that.
+    /// O(n) for the most part, as a sample of the cells is looked at; half a byte a point while it works.
+    pub fn is_coarse(&self) -> bool {
+        let cell = COARSE * self.float_step();
+        if cell <= 0.0 {
+            return false;
+        }
+        let keys = self.positions.par_iter().filter_map(|position| {
+            let cell = ((*position - self.min).as_dvec3() / cell).as_u64vec3();
+            // Each axis has at most 2^22 cells of half the extent's steps.
+            let key = mixed((cell.x << 42) ^ (cell.y << 21) ^ cell.z);
+            (key % SAMPLED_CELLS == 0).then_some(key)
+        });
+        let mut keys: Vec<u64> = keys.collect();
+        keys.par_sort_unstable();
+        let n_sharing: usize = keys
+            .par_chunk_by(|a, b| a == b)
+            .map(|same| if same.len() > 1 { same.len() } else { 0 })
+            .sum();
+        n_sharing as f64 > COARSE_SHARE * keys.len() as f64
+    }
+
+    /// What the position of `point` lacks of the exact place in the file's coordinates, to be given to
+    /// [`Self::with_remainders`].
+    pub fn remainder(&self, point: usize, exact: DVec3) -> [i8; 3] {
+        let lacks = (exact - self.origin) - self.positions[point].as_dvec3();
+        let steps = lacks / self.remainder_step().max(f64::MIN_POSITIVE);
+        // The cast saturates: half a step of f32 up is 128.
+        steps.round().to_array().map(|steps| steps as i8)
+    }
+
+    /// The same cloud with what each of its positions lacks, see [`Self::remainder`].
+    ///
+    /// # Panics
+    /// When there are not as many remainders as points.
+    pub fn with_remainders(mut self, remainders: Vec<[i8; 3]>) -> Self {
+        assert_eq!(remainders.len(), self.n_points(), "a remainder for each point");
+        self.remainders = remainders;
+        self
+    }
+
+    /// Whether it keeps what `f32` rounds away.
+    pub fn has_remainders(&self) -> bool {
+        !self.remainders.is_empty()
+    }
+
+    /// The largest distance between neighboring `f32` coordinates of the cloud; 0 when all are 0.
+    fn float_step(&self) -> f64 {
+        let largest = self.min.abs().max(self.max.abs()).max_element();
+        // The exponent without the mantissa, and 23 bits down from there.
+        f64::from(f32::from_bits(largest.to_bits() & 0x7f80_0000)) * 2.0_f64.powi(-23)
+    }
+
+    /// The unit of remainders.
+    fn remainder_step(&self) -> f64 {
+        self.float_step() / 256.0
+    }
+
+    /// The place of `point` relative to [`Self::origin`], as exactly as it is known.
+    #[inline]
+    pub fn relative(&self, point: usize) -> DVec3 {
+        let position = self.positions[point].as_dvec3();
+        match self.remainders.get(point) {
+            None => position,
+            Some(&[x, y, z]) => position + DVec3::new(x.into(), y.into(), z.into()) * self.remainder_step(),
+        }
+    }
+
+    /// The way from one point to another, as exactly as both are known.
+    #[inline]
+    pub fn offset(&self, from: usize, to: usize) -> DVec3 {
+        self.relative(to) - self.relative(from)
+    }
+
+    /// The cloud of some of the points, in their order, around the same origin.
+    pub(crate) fn subset(&self, points: &[u32]) -> Self {
+        let position = |&point: &u32| self.positions[point as usize];
+        let positions: Vec<Vec3> = points.par_iter().map(position).collect();
+        let has_remainders = self.has_remainders();
+        let remainders = points.par_iter().filter(|_| has_remainders);
+        let remainders = remainders.map(|&point| self.remainders[point as usize]).collect();
+        // Corners of the whole, so that the unit of remainders and all that goes by the extent stay the same.
+        Self {
+            origin: self.origin,
+            positions,
+            remainders,
+            min: self.min,
+            max: self.max,
+        }
+    }
+
+    /// Two numbers that are equal for points in one place.
+    #[inline]
+    pub(crate) fn place_key(&self, point: usize) -> u64 {
+        // 0 and −0 are one place.
+        let [x, y, z] = (self.positions[point] + 0.0)
+            .to_array()
+            .map(|value| u64::from(value.to_bits()));
+        let [a, b, c] = self
+            .remainders
+            .get(point)
+            .copied()
+            .unwrap_or_default()
+            .map(|value| u64::from(value as u8));
+        mixed(mixed(x << 32 | y) ^ (z << 24 | a << 16 | b << 8 | c))
+    }
+
     /// Number of points.
     pub fn n_points(&self) -> usize {
         self.positions.len()
@@ -150,6 +272,23 @@ impl PointCloud {
     pub fn diagonal(&self) -> f32 {
         (self.max - self.min).length()
     }
+}
+
+/// Steps of `f32` along a cell in which more than one point means that rounding matters. Coordinates are off by up to half a step,
+/// by 0.3 typically; on points 16 steps apart that turns normals by about half a degree.
+const COARSE: f64 = 16.0;
+
+/// Share of the points in such company from which on it matters: 1 in 100 on a surface whose points are ten cells apart.
+const COARSE_SHARE: f64 = 0.01;
+
+/// Of so many cells one is looked at.
+const SAMPLED_CELLS: u64 = 16;
+
+/// A number as good as random that belongs to `number`; no two numbers have the same.
+pub(crate) fn mixed(number: u64) -> u64 {
+    let number = (number ^ number >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let number = (number ^ number >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    number ^ number >> 31
 }
 
 /// Spans whose squared distances `f32` can tell apart.
@@ -226,6 +365,52 @@ mod tests {
             (Vec3::new(-1.0, -2.0, 3.0), Vec3::new(1.0, 2.0, 5.0))
         );
         assert_eq!(cloud.diagonal(), 24.0_f32.sqrt());
+    }
+
+    /// A square of `side × side` points so far apart, around a corner, and one point far away.
+    fn square_and_outlier(side: u32, spacing: f64, corner: DVec3, away: f64) -> Vec<DVec3> {
+        let square = (0..side * side).map(|i| corner + DVec3::new((i % side).into(), (i / side).into(), 0.0) * spacing);
+        square.chain([corner + DVec3::X * away]).collect()
+    }
+
+    #[test]
+    fn what_f32_rounds_away_is_kept_where_points_are_as_close() {
+        let corner = DVec3::new(500_000.123, 4_500_000.456, 78.9);
+        for (spacing, away, expect) in [
+            (1e-3, 100.0, false),
+            (1e-2, 1e3, false),
+            (1e-3, 1e4, true),
+            (1e-3, 1e5, true),
+            (1e-2, 1e5, true),
+            (1.0, 1e5, false),
+        ] {
+            let points = square_and_outlier(100, spacing, corner, away);
+            let cloud = PointCloud::from_f64(&points).unwrap();
+            assert_eq!(cloud.has_remainders(), expect, "{spacing} of {away}");
+            for (id, &point) in points.iter().enumerate() {
+                let error = (cloud.origin() + cloud.relative(id) - point).abs().max_element();
+                // Half a step of 24 bits without, of 32 with remainders; and f64 itself, of millions of meters.
+                let bits = if expect { 32 } else { 24 };
+                assert!(
+                    error <= away * 2.0_f64.powi(-bits) + 2e-9,
+                    "{error} of {spacing} of {away}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_f32_holds_needs_no_remainders() {
+        // Points 1/64 apart and one 100 km away are exact.
+        let points = square_and_outlier(100, 1.0 / 64.0, DVec3::ZERO, 1e5);
+        let cloud = PointCloud::from_f64(&points).unwrap();
+        assert!(cloud.is_coarse() && !cloud.has_remainders());
+        assert!(
+            points
+                .iter()
+                .enumerate()
+                .all(|(id, &point)| cloud.origin() + cloud.relative(id) == point)
+        );
     }
 
     proptest! {

@@ -1,5 +1,6 @@
 //! From cloud and parameters to the tree that signs travel along: everything slow, once, in a job.
 
+mod expanded;
 mod given;
 mod method;
 mod preset;
@@ -22,6 +23,7 @@ pub use self::preset::Preset;
 use self::sides::sides;
 pub use self::source_rule::{ETA, SourceRule, VIEWS};
 use crate::automatic;
+use crate::copies::Copies;
 use crate::evidence::{self, Evidence, FoundStation, Known, Origin, Station};
 use crate::progress::Part;
 use crate::side_rule::{Clues, Side};
@@ -215,6 +217,9 @@ impl Propagation {
     /// Runs neighbors → normals → graph → tree → initial cuts. `known` is what is known besides, such as the file's
     /// normals; without one that can be used [`Start::Keep`] is the same as [`Start::Estimate`].
     ///
+    /// Of points in one place the first stands for all: the others take its normal and sign, and a place that several scanners
+    /// measured counts for the one that measured its first point. Given normals that are kept are kept by point.
+    ///
     /// # Errors
     /// [`Cancelled`] when `progress` asks to stop; nothing else.
     pub fn new<'a>(
@@ -224,6 +229,30 @@ impl Propagation {
         progress: &dyn Progress,
     ) -> Result<Self, Cancelled> {
         let known = known.into();
+        let Some(copies) = Copies::find(cloud) else {
+            return Self::of_distinct(cloud, known, parameters, progress);
+        };
+        let (given, stations) = (
+            known.given.map(|given| copies.given(given)),
+            copies.stations(known.stations),
+        );
+        let by_place = Known {
+            given: given.as_deref(),
+            stations: &stations,
+            viewpoints: known.viewpoints,
+        };
+        let found = Self::of_distinct(&copies.distinct, by_place, parameters, progress)?;
+        let kept = known.given.filter(|_| parameters.start == Start::Keep);
+        Ok(found.with_copies(cloud, &copies, kept))
+    }
+
+    /// [`Self::new`] for points each of which has a place of its own.
+    fn of_distinct(
+        cloud: &PointCloud,
+        known: Known<'_>,
+        parameters: Parameters,
+        progress: &dyn Progress,
+    ) -> Result<Self, Cancelled> {
         let k_normals = clamp(parameters.k_normals, Parameters::K_NORMALS);
         let k_graph = clamp(parameters.k_graph, Parameters::K_GRAPH);
         let given = known

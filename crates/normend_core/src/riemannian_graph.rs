@@ -131,7 +131,6 @@ impl RiemannianGraph {
 
         let mut half_edges = vec![HalfEdge::default(); row_starts[n_points]];
         let chunks = split_at_rows(&mut half_edges, &row_starts);
-        let positions = cloud.positions();
         chunks.into_par_iter().try_for_each(|(first, chunk)| {
             let mut free = chunk.iter_mut();
             let last = (first + ROWS).min(n_points);
@@ -140,11 +139,8 @@ impl RiemannianGraph {
                 // The row comes first in the zip: it must not take a place of the next row when it ends.
                 for (&neighbor, half_edge) in kept.zip(&mut free) {
                     let other = neighbor as usize;
-                    let agreement = Agreement::between(
-                        rule,
-                        (positions[point], normals[point]),
-                        (positions[other], normals[other]),
-                    );
+                    let edge = cloud.offset(point, other);
+                    let agreement = Agreement::between(rule, edge, normals[point], normals[other]);
                     *half_edge = HalfEdge::new(neighbor, agreement.weight, agreement.disagree);
                 }
             }
@@ -241,13 +237,12 @@ struct Agreement {
 }
 
 impl Agreement {
-    /// Compares the normals at the ends `(position, normal)` of an edge. Exchanging the ends gives the same.
-    fn between(rule: EdgeRule, a: (Vec3, Vec3), b: (Vec3, Vec3)) -> Self {
-        let (normal_a, normal_b) = (a.1.as_dvec3(), b.1.as_dvec3());
+    /// Compares the normals at the ends of an edge. Exchanging the ends gives the same.
+    fn between(rule: EdgeRule, edge: DVec3, normal_a: Vec3, normal_b: Vec3) -> Self {
+        let (normal_a, normal_b) = (normal_a.as_dvec3(), normal_b.as_dvec3());
         let expected = match rule {
             EdgeRule::Dot => normal_b,
             EdgeRule::Reflection => {
-                let edge = b.0.as_dvec3() - a.0.as_dvec3();
                 // Two points in one place have no edge direction, and nothing to be mirrored in.
                 let direction = edge.try_normalize().unwrap_or(DVec3::ZERO);
                 normal_b - 2.0 * normal_b.dot(direction) * direction
@@ -273,6 +268,11 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    /// Compares the normals at the ends `(position, normal)` of an edge.
+    fn agreement(rule: EdgeRule, a: (Vec3, Vec3), b: (Vec3, Vec3)) -> Agreement {
+        Agreement::between(rule, b.0.as_dvec3() - a.0.as_dvec3(), a.1, b.1)
+    }
     use crate::Silent;
 
     fn any_vector() -> impl Strategy<Value = Vec3> {
@@ -330,7 +330,7 @@ mod tests {
         #[test]
         fn an_edge_is_the_same_from_both_ends(a in any_cloud(), b in any_cloud()) {
             for rule in EdgeRule::ALL {
-                let (there, back) = (Agreement::between(rule, a[0], b[0]), Agreement::between(rule, b[0], a[0]));
+                let (there, back) = (agreement(rule, a[0], b[0]), agreement(rule, b[0], a[0]));
                 prop_assert_eq!(there.disagree, back.disagree);
                 prop_assert!((there.weight - back.weight).abs() <= 1e-6 * there.weight);
             }
@@ -341,7 +341,7 @@ mod tests {
     fn nearly_parallel_normals_keep_their_order() {
         // 1 − |c| rounds to the same f32 for both angles.
         let at = |angle: f32| (Vec3::X * angle, Vec3::new(angle.sin(), 0.0, angle.cos()));
-        let weight = |angle: f32| Agreement::between(EdgeRule::Dot, at(0.0), at(angle)).weight;
+        let weight = |angle: f32| agreement(EdgeRule::Dot, at(0.0), at(angle)).weight;
         assert!(weight(1e-5) < weight(2e-5));
         assert!((weight(1e-3) / 5e-7 - 1.0).abs() < 1e-3);
     }
@@ -353,14 +353,14 @@ mod tests {
             weight: 0.0,
             disagree: true,
         };
-        assert_eq!(Agreement::between(EdgeRule::Reflection, a, b), expect);
+        assert_eq!(agreement(EdgeRule::Reflection, a, b), expect);
         // Across a thin wall the mirror image agrees.
         let b = (Vec3::new(1.0, 1.0, 0.9), Vec3::NEG_Z);
         let expect = Agreement {
             weight: 0.0,
             disagree: false,
         };
-        assert_eq!(Agreement::between(EdgeRule::Reflection, a, b), expect);
+        assert_eq!(agreement(EdgeRule::Reflection, a, b), expect);
     }
 
     #[test]

@@ -12,6 +12,7 @@ use std::ops::Range;
 
 use fixedbitset::FixedBitSet;
 
+use crate::copies::Members;
 use crate::progress::Part;
 use crate::{Cancelled, Progress, RiemannianGraph};
 
@@ -93,15 +94,7 @@ impl SpanningTree {
         }
         // From here `degrees` is 1 for a point with a parent, whose edge is `edge_xors`, and 0 for a root.
 
-        let mut tree = Self {
-            roots: Vec::new(),
-            order: vec![0; n_points],
-            positions: vec![0; n_points],
-            parents: vec![0; n_points],
-            subtree_ends: vec![0; n_points],
-            weights: vec![0.0; n_points],
-            phi: FixedBitSet::with_capacity(n_points),
-        };
+        let mut tree = Self::of_nothing(n_points);
         let mut free = 0;
         for point in 0..n_points {
             if degrees[point] == 0 {
@@ -141,6 +134,61 @@ impl SpanningTree {
         self.parents[position_index] = parent;
         self.subtree_ends[position_index] = position + size;
         self.weights[position_index] = weight;
+    }
+
+    /// The tree over all points of a cloud from the one over its places, and where each old position went.
+    ///
+    /// The first point of a place stands for it, its copies are the last children of that, over edges of weight 0, turned where
+    /// `turned` (by point) says so. O(n).
+    pub(crate) fn with_copies(&self, places: &Members, turned: &FixedBitSet) -> (Self, Vec<u32>) {
+        let (n_places, n_points) = (self.n_points(), places.n_points());
+        // Copies come after the subtree of their place, so a position moves by those of all subtrees that end before it.
+        let mut positions = vec![0_u32; n_places + 1];
+        // How many points are at the old positions before each.
+        let mut points_before = vec![0_u32; n_places + 1];
+        for position in 0..n_places {
+            let n_copies = places.copies(self.order[position]).len() as u32;
+            positions[self.subtree_ends[position] as usize] += n_copies;
+            points_before[position + 1] = points_before[position] + 1 + n_copies;
+        }
+        let mut moved_by = 0;
+        for (position, moved) in (0..).zip(&mut positions) {
+            moved_by += *moved;
+            *moved = position + moved_by;
+        }
+        let mut tree = Self {
+            roots: self.roots.iter().map(|&root| positions[root as usize]).collect(),
+            ..Self::of_nothing(n_points)
+        };
+        for (old, &place) in self.order.iter().enumerate() {
+            let position = positions[old];
+            let size = points_before[self.subtree_ends[old] as usize] - points_before[old];
+            let parent = positions[self.parents[old] as usize];
+            tree.place(places.first(place) as usize, position, parent, self.weights[old], size);
+            tree.phi.set(position as usize, self.phi.contains(old));
+            let copies = places.copies(place);
+            let first_copy = position + size - copies.len() as u32;
+            for (copy, &point) in (first_copy..).zip(copies) {
+                tree.place(point as usize, copy, position, 0.0, 1);
+                let turns = self.phi.contains(old) != turned.contains(point as usize);
+                tree.phi.set(copy as usize, turns);
+            }
+        }
+        positions.truncate(n_places);
+        (tree, positions)
+    }
+
+    /// Room for a tree of so many points.
+    fn of_nothing(n_points: usize) -> Self {
+        Self {
+            roots: Vec::new(),
+            order: vec![0; n_points],
+            positions: vec![0; n_points],
+            parents: vec![0; n_points],
+            subtree_ends: vec![0; n_points],
+            weights: vec![0.0; n_points],
+            phi: FixedBitSet::with_capacity(n_points),
+        }
     }
 
     /// Number of points, which is also the number of positions.

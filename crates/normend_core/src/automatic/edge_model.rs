@@ -56,7 +56,7 @@ impl Surface<'_> {
     fn features(&self, a: u32, b: u32) -> Features {
         // From the smaller id, so that both ends see the same bits.
         let (a, b) = (a.min(b) as usize, a.max(b) as usize);
-        let edge = self.cloud.positions()[b] - self.cloud.positions()[a];
+        let edge = self.cloud.offset(a, b).as_vec3();
         let length = edge.length();
         let direction = if length > 0.0 { edge / length } else { Vec3::ZERO };
         let (normal_a, normal_b) = (self.normals[a], self.normals[b]);

@@ -39,7 +39,6 @@ pub(super) fn second_look(
     turned: &FixedBitSet,
 ) -> SecondLook {
     let n_points = normals.len();
-    let positions = cloud.positions();
     let oriented = |point: usize| {
         if turned.contains(point) {
             -normals[point]
@@ -79,9 +78,8 @@ pub(super) fn second_look(
                 if same.len() < LEAST_FIT {
                     return normals[point];
                 }
-                let center = positions[point].as_dvec3();
                 offsets.clear();
-                offsets.extend(same.iter().map(|&other| positions[other as usize].as_dvec3() - center));
+                offsets.extend(same.iter().map(|&other| cloud.offset(point, other as usize)));
                 let fitted = plane_of_least_squares(offsets).as_vec3();
                 if fitted.dot(normals[point]) < 0.0 {
                     -fitted

@@ -109,13 +109,11 @@ const POINTS: usize = 1024;
 
 /// The neighbors' positions relative to the point's, in its radii.
 fn offsets_of(cloud: &PointCloud, point: usize, row: &[u32], radius: f32, offsets: &mut Vec<DVec3>) {
-    let positions = cloud.positions();
-    let center = positions[point].as_dvec3();
     let radius = f64::from(radius).max(f64::MIN_POSITIVE);
     offsets.clear();
     offsets.extend(
         row.iter()
-            .map(|&neighbor| (positions[neighbor as usize].as_dvec3() - center) / radius),
+            .map(|&neighbor| cloud.offset(point, neighbor as usize) / radius),
     );
 }
 

@@ -30,6 +30,8 @@ pub use outside_views::{N_VIEWS, outside_views};
 pub use scanner::{Station, scanner};
 pub use station_search::{FoundStation, find_station};
 
+use crate::copies::Members;
+
 /// A vote of one: what a single look at a point from straight above weighs. 1/4096 is finer than any weight is known, and
 /// the sum over the points of the largest cloud stays within `i64`.
 pub const UNIT: i32 = 4096;
@@ -168,6 +170,14 @@ impl Evidence {
     pub(crate) fn turn(&mut self, turned: &FixedBitSet) {
         for point in turned.ones() {
             self.votes[point].signed = -self.votes[point].signed;
+        }
+    }
+
+    /// The votes by point of those by place.
+    pub(crate) fn with_copies(&self, places: &Members) -> Self {
+        Self {
+            votes: places.by_point(&self.votes),
+            origins: self.origins.clone(),
         }
     }
 

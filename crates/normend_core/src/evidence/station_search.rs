@@ -172,7 +172,7 @@ impl Search {
             .filter_map(|&(_, id)| {
                 let point = id as usize;
                 let other = neighbors.of(point)[neighbor] as usize;
-                let spacing = f64::from(positions[point].distance(positions[other]));
+                let spacing = f64::from(cloud.offset(point, other).as_vec3().length());
                 (spacing > 0.0).then(|| Sample {
                     position: in_frame(point),
                     normal: frame.frame_from_cloud * normals[point].as_dvec3(),

@@ -109,22 +109,17 @@ fn for_each_neighborhood(
     progress: &dyn Progress,
     normal_of: impl Fn(usize, &[DVec3]) -> Vec3 + Sync,
 ) -> Result<Vec<Vec3>, Cancelled> {
-    let positions = cloud.positions();
     let k = k.min(neighbors.k());
-    let steps = Steps::new(progress, positions.len());
-    let mut normals = vec![Vec3::ZERO; positions.len()];
+    let steps = Steps::new(progress, cloud.n_points());
+    let mut normals = vec![Vec3::ZERO; cloud.n_points()];
     normals.par_chunks_mut(POINTS).enumerate().try_for_each_init(
         || Vec::with_capacity(k),
         |offsets, (task, normals)| {
             for (i, normal) in normals.iter_mut().enumerate() {
                 let point = task * POINTS + i;
-                let center = positions[point].as_dvec3();
                 offsets.clear();
                 let row = &neighbors.of(point)[..k];
-                offsets.extend(
-                    row.iter()
-                        .map(|&neighbor| positions[neighbor as usize].as_dvec3() - center),
-                );
+                offsets.extend(row.iter().map(|&neighbor| cloud.offset(point, neighbor as usize)));
                 *normal = normal_of(point, offsets);
             }
             steps.advance(normals.len())

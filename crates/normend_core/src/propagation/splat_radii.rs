@@ -13,13 +13,12 @@ pub(super) const K: usize = 6;
 /// random, and nothing when they are even. A point alone far outside would be a disc as large as its distance, so a radius
 /// is at most three times that of the neighbors' middle.
 pub(super) fn splat_radii(cloud: &PointCloud, neighbors: &Neighbors) -> Vec<f32> {
-    let positions = cloud.positions();
     let k = K.min(neighbors.k());
-    let reach: Vec<f32> = (0..positions.len())
+    let reach: Vec<f32> = (0..cloud.n_points())
         .into_par_iter()
         .map(|point| {
             let row = neighbors.of(point);
-            let distance = |neighbor: u32| positions[neighbor as usize].distance(positions[point]);
+            let distance = |neighbor: u32| cloud.offset(point, neighbor as usize).as_vec3().length();
             // With copies in one place the first neighbor elsewhere counts.
             row[k.saturating_sub(1)..]
                 .iter()
@@ -30,7 +29,7 @@ pub(super) fn splat_radii(cloud: &PointCloud, neighbors: &Neighbors) -> Vec<f32>
         .collect();
     let fallback = fallback(cloud, &reach);
     let reach_or_fallback = |point: usize| if reach[point] > 0.0 { reach[point] } else { fallback };
-    (0..positions.len())
+    (0..cloud.n_points())
         .into_par_iter()
         .map(|point| {
             let mut around = [f32::INFINITY; K];

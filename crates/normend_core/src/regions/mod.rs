@@ -114,6 +114,12 @@ impl Regions {
         tops.filter(|&top| self.initial_tops.contains(top as usize))
     }
 
+    /// The tops of the base regions, ascending, and whether they are turned without any source.
+    pub(crate) fn base_signs(&self) -> impl Iterator<Item = (u32, bool)> {
+        let tops = self.initial_tops.ones().map(|top| top as u32);
+        tops.map(|top| (top, self.default_orientation.is_turned(top)))
+    }
+
     /// Number of regions: each has a source, or is a base region without one. O(n / 64).
     pub fn n_regions(&self) -> usize {
         self.tops.len()
