@@ -99,6 +99,75 @@ impl Scan {
                 return Err(WriteError::NoConfidence { path: path.to_owned() });
             }
         }
+        let layout = self.file.layout.as_ref();
+        let bytes = &self.file.bytes[..];
+        let normals = RowNormals::new(normals, confidence, self.rows.as_ref().map(|rows| rows.as_slice()));
+        let comment = format!(
+            "Normend {}: normals oriented, rule: {}",
+            env!("CARGO_PKG_VERSION"),
+            one_line(&options.rule)
+        );
+        self.place(path, options, |out| {
+            if format == self.format {
+                let content = NewContent {
+                    normals,
+                    comment: &comment,
+                };
+                return layout.rewrite(bytes, &content, out, progress);
+            }
+            self.write_new(format, Some(normals), &comment, out, progress)
+        })
+    }
+
+    /// Writes the scan to `path` as it is, in the format of `path`'s extension: the normals that the file has, if any, and all
+    /// else that the format can hold ([`Self::losses`] names the rest).
+    ///
+    /// # Errors
+    /// [`WriteError`]; the target is as it was then. [`WriteError::Target`] where the format is the input's already.
+    pub fn convert(&self, path: &Path, options: &WriteOptions, progress: &dyn Progress) -> Result<(), WriteError> {
+        progress.stage("Writing");
+        let format = FileFormat::of_target(path, self.path().map(PathBuf::as_path))?.unwrap_or(self.format);
+        if format == self.format {
+            return Err(WriteError::Target {
+                path: path.to_owned(),
+                reason: "would be of the format that came in: copy the file",
+            });
+        }
+        let rows = self.rows.as_ref().map(|rows| rows.as_slice());
+        let given = self.given_normals.as_ref();
+        let normals = given.map(|given| RowNormals::new(given, None, rows));
+        let comment = format!(
+            "Normend {}: converted from {}",
+            env!("CARGO_PKG_VERSION"),
+            self.format.label()
+        );
+        self.place(path, options, |out| {
+            self.write_new(format, normals, &comment, out, progress)
+        })
+    }
+
+    /// Writes all that another format can hold.
+    fn write_new(
+        &self,
+        format: FileFormat,
+        normals: Option<RowNormals<'_>>,
+        comment: &str,
+        out: &mut Output<'_>,
+        progress: &dyn Progress,
+    ) -> Result<(), WriteError> {
+        let mut file = NewFile::of_file(self.file.layout.as_ref(), &self.file.bytes, normals);
+        file.comment = Some(comment);
+        format.limit(&mut file, out.path);
+        format.write_new(&mut file, out, progress)
+    }
+
+    /// Puts what `fill` writes in the place of `path`, over the input only if `options` allow it.
+    fn place(
+        &self,
+        path: &Path,
+        options: &WriteOptions,
+        fill: impl FnOnce(&mut Output<'_>) -> Result<(), WriteError>,
+    ) -> Result<(), WriteError> {
         let is_input = || self.path().is_some_and(|input| save::is_same_file(input, path));
         if is_input() {
             if !options.overwrite_input {
@@ -108,24 +177,7 @@ impl Scan {
                 return Err(WriteError::InputChanged { path: path.to_owned() });
             }
         }
-        let layout = self.file.layout.as_ref();
-        let bytes = &self.file.bytes[..];
-        let normals = RowNormals::new(normals, confidence, self.rows.as_ref().map(|rows| rows.as_slice()));
-        let comment = comment(&options.rule);
-        let written = save::place(path, |file| {
-            let mut out = Output { path, file };
-            if format == self.format {
-                let content = NewContent {
-                    normals,
-                    comment: &comment,
-                };
-                return layout.rewrite(bytes, &content, &mut out, progress);
-            }
-            let mut file = NewFile::of_file(layout, bytes, Some(normals));
-            file.comment = Some(&comment);
-            format.limit(&mut file, path);
-            format.write_new(&mut file, &mut out, progress)
-        })?;
+        let written = save::place(path, |file| fill(&mut Output { path, file }))?;
         // Another name of the input (a hard link) is a file of its own by now.
         if is_input() {
             // Where it cannot be read again, a journal of this scan is not taken for one of the new content. It is written all the same.
@@ -135,10 +187,9 @@ impl Scan {
     }
 }
 
-/// The comment line that names program, version and rule.
-fn comment(rule: &str) -> String {
-    let rule = rule.replace(char::is_control, " ");
-    format!("Normend {}: normals oriented, rule: {rule}", env!("CARGO_PKG_VERSION"))
+/// A rule in words as it may stand in a comment.
+fn one_line(rule: &str) -> String {
+    rule.replace(char::is_control, " ")
 }
 
 fn check_normals(normals: &[Vec3], n_points: usize) -> Result<(), WriteError> {
