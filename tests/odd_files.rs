@@ -219,6 +219,16 @@ fn points_that_are_not_finite_stay_in_the_file() {
         &[Vec3::Y],
         "x y z nx ny nz\nnan 0 0 9 nan 0\n1 2 3 0 1 0\n",
     );
+    // In another format too, where it is a number.
+    let input = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\n\
+                 property float ny\nproperty float nz\nend_header\nnan 0 0 0 0.6 -0.8\n1 2 3 0 0 1\ninf 0 0 0 nan 0\n";
+    let out = written(
+        &read_bytes(input.into(), "scan.ply", &Silent).unwrap(),
+        &[Vec3::Y],
+        "out.csv",
+    );
+    let expect = "x,y,z,nx,ny,nz\nnan,0,0,0,0.6,-0.8\n1,2,3,0,1,0\ninf,0,0,0,0,1\n";
+    assert_eq!(String::from_utf8(out).unwrap(), expect);
 }
 
 #[test]

@@ -1,0 +1,37 @@
+"""CGAL, with LASlib: PLY, text, LAS."""
+
+import numpy as np
+from CGAL.CGAL_Kernel import Point_3, Vector_3
+from CGAL.CGAL_Point_set_3 import Point_set_3
+
+from case import TEXT, Case
+from clouds import Cloud
+
+
+def read(path) -> Cloud:
+    """Reads positions and normals."""
+    points = Point_set_3()
+    points.read(str(path))
+    positions = np.array([[point.x(), point.y(), point.z()] for point in points.points()])
+    normals = None
+    if points.has_normal_map():
+        normals = np.array([[normal.x(), normal.y(), normal.z()] for normal in points.normals()])
+    return Cloud(positions, normals)
+
+
+def write(cloud: Cloud, path) -> None:
+    """Writes positions and normals."""
+    points = Point_set_3()
+    points.add_normal_map()
+    for position, normal in zip(cloud.positions.tolist(), cloud.normals.tolist()):
+        points.insert(Point_3(*position), Vector_3(*normal))
+    if not points.write(str(path)):
+        raise RuntimeError("CGAL did not write the file")
+
+
+HOLES = {"holes": "it ends at the first nan"}
+
+CASES = [
+    Case(program="cgal", format="PLY, little-endian", extension=".ply", read=read, write=write),
+    Case(program="cgal", format="text, x y z nx ny nz", extension=".xyz", read=read, write=write, made=TEXT, without=HOLES),
+]

@@ -1,0 +1,59 @@
+"""CloudCompare, by its command line: PLY and text."""
+
+from case import TEXT, Case, read_ply, run
+from clouds import COLORS, CLOUDS, Cloud, write_plain_ply
+from compare import FLOAT, Kept, same, within
+
+VALUES = ("intensity", "classification", "gps_time", "range", "target")
+
+
+def convert(source, target, *options) -> None:
+    """Has CloudCompare open a file and save another."""
+    # What is shifted is held as float; near the middle of the clouds that is precise.
+    shift = ["-GLOBAL_SHIFT", "-500000", "-4500000", "0"] if "UTM" in str(source) else []
+    run("CloudCompare", "-SILENT", "-AUTO_SAVE", "OFF", "-NO_TIMESTAMP", *options, "-O", *shift, source, "-SAVE_CLOUDS", "FILE", target)
+
+
+def read(path) -> Cloud:
+    """Has CloudCompare read a file and save it as PLY."""
+    ply = path.with_suffix(".cloudcompare.ply")
+    convert(path, ply, "-C_EXPORT_FMT", "PLY", "-PLY_EXPORT_FMT", "BINARY_LE")
+    cloud = read_ply(ply)
+    cloud.values = {name.removeprefix("scalar_"): of for name, of in cloud.values.items()}
+    return cloud
+
+
+def write(cloud: Cloud, path) -> None:
+    """Has CloudCompare read a plain PLY and save it."""
+    plain = path.with_suffix(".plain.ply")
+    write_plain_ply(cloud, plain)
+    kind = {".ply": ("PLY", "-PLY_EXPORT_FMT", "BINARY_LE"), ".xyz": ("ASC", "-PREC", "9", "-SEP", "SPACE")}[path.suffix]
+    convert(plain, path, "-C_EXPORT_FMT", *kind)
+
+
+HOLES = {"holes": "it puts them at 0 0 0"}
+# Normals are one of two million directions.
+NORMALS = within(2e-3)
+
+CASES = [
+    Case(
+        program="CloudCompare",
+        format="PLY, little-endian",
+        extension=".ply",
+        read=read,
+        write=write,
+        reads=Kept(points=within(1e-5), normals=NORMALS, values=same((*COLORS, "intensity")), remark="rounds normals"),
+        writes=Kept(points=within(1e-5), normals=NORMALS, values=same((*COLORS, "intensity"))),
+        made=Kept(values=same((*COLORS, "intensity"))),
+        without=HOLES,
+    ),
+    Case(
+        program="CloudCompare",
+        format="text, x y z nx ny nz",
+        extension=".xyz",
+        read=read,
+        made=TEXT,
+        without=HOLES,
+        reads=Kept(points=within(1e-5), normals=NORMALS, remark="rounds normals"),
+    ),
+]

@@ -1,0 +1,62 @@
+"""numpy: text with a column for each value, with names and without."""
+
+import numpy as np
+
+from case import TEXT, Case
+from clouds import CLOUDS, Cloud
+from compare import Kept, same
+
+NAMES = ("x", "y", "z", "nx", "ny", "nz", *CLOUDS["local"].values)
+ALL = same(CLOUDS["local"].values)
+
+
+def write(cloud: Cloud, path, delimiter=" ", comments="") -> None:
+    """Writes a line of names and a line for each point, with all digits."""
+    rows = np.column_stack([cloud.positions, cloud.normals.astype(np.float64), *cloud.values.values()])
+    np.savetxt(path, rows, fmt="%.17g", delimiter=delimiter, header=delimiter.join(NAMES), comments=comments)
+
+
+def read(path, delimiter=None) -> Cloud:
+    """Reads columns by their names."""
+    table = np.atleast_1d(np.genfromtxt(path, delimiter=delimiter, names=True, deletechars=""))
+    columns = {name: table[name] for name in table.dtype.names}
+    take = lambda *chosen: np.column_stack([columns.pop(name) for name in chosen])
+    return Cloud(take("x", "y", "z"), take("nx", "ny", "nz"), columns)
+
+
+def write_bare(cloud: Cloud, path) -> None:
+    """Writes six columns without names."""
+    np.savetxt(path, np.column_stack([cloud.positions, cloud.normals]), fmt="%.17g")
+
+
+def read_bare(path) -> Cloud:
+    """Reads six columns without names."""
+    rows = np.loadtxt(path, ndmin=2)
+    return Cloud(rows[:, :3], rows[:, 3:6])
+
+
+CASES = [
+    Case(program="numpy", format="text, x y z nx ny nz", extension=".xyz", read=read_bare, write=write_bare, made=TEXT),
+    Case(
+        program="numpy",
+        format="CSV",
+        extension=".csv",
+        read=lambda path: read(path, ","),
+        write=lambda cloud, path: write(cloud, path, ","),
+        reads=Kept(values=ALL),
+        writes=Kept(values=ALL),
+        made=TEXT,
+    ),
+    Case(
+        program="numpy",
+        format="text, named columns",
+        extension=".txt",
+        write=lambda cloud, path: write(cloud, path, "\t", "# "),
+        read=lambda path: read(path, "\t"),
+        write_source=lambda cloud, path: write(cloud, path, "\t", "# "),
+        source_extension=".txt",
+        reads=Kept(values=ALL),
+        writes=Kept(values=ALL),
+        made=Kept(values=ALL),
+    ),
+]

@@ -1,0 +1,27 @@
+"""VTK, through PyVista: PLY."""
+
+import numpy as np
+import pyvista
+
+from case import Case
+from clouds import COLORS, Cloud, with_colors
+from compare import FLOAT, Kept, same
+
+
+def read(path) -> Cloud:
+    """Reads positions, normals and colors."""
+    mesh = pyvista.read(path)
+    colors = with_colors(mesh.point_data["RGB"]) if "RGB" in mesh.point_data else {}
+    return Cloud(np.asarray(mesh.points, np.float64), np.asarray(mesh.point_data["Normals"]), colors)
+
+
+CASES = [
+    Case(
+        program="pyvista",
+        format="PLY, little-endian",
+        extension=".ply",
+        read=read,
+        reads=Kept(points=FLOAT, values=same(COLORS), remark="coordinates are float in VTK's reader"),
+        made=Kept(values=same(COLORS)),
+    ),
+]
