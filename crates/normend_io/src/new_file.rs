@@ -16,7 +16,7 @@ use crate::rewrite::{NO_NORMAL, RowNormals};
 use crate::table::{
     COORDINATES, Frame, Layout, MOST_COLUMNS, NORMAL, PART_ROWS, Rows, SIDE, Span, VALUE_NAMES, for_each_part,
 };
-use crate::value::{Scalar, ValueType, push_number};
+use crate::value::{Scalar, ValueType, push_number, push_scalar};
 
 /// Something that a file of another format cannot hold.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -74,21 +74,7 @@ impl Cell<'_> {
             // The same bits, also of a NaN, and of whole numbers that `f64` would round.
             (ValueType::LittleEndian(own), _) if own == scalar => out.extend_from_slice(self.bytes),
             (ValueType::BigEndian(own), _) if own == scalar => out.extend(self.bytes.iter().rev()),
-            _ => {
-                let value = self.number();
-                match scalar {
-                    Scalar::Char => out.extend((value.round() as i8).to_le_bytes()),
-                    Scalar::UChar => out.extend((value.round() as u8).to_le_bytes()),
-                    Scalar::Short => out.extend((value.round() as i16).to_le_bytes()),
-                    Scalar::UShort => out.extend((value.round() as u16).to_le_bytes()),
-                    Scalar::Int => out.extend((value.round() as i32).to_le_bytes()),
-                    Scalar::UInt => out.extend((value.round() as u32).to_le_bytes()),
-                    Scalar::Long => out.extend((value.round() as i64).to_le_bytes()),
-                    Scalar::ULong => out.extend((value.round() as u64).to_le_bytes()),
-                    Scalar::Float => out.extend((value as f32).to_le_bytes()),
-                    Scalar::Double => out.extend(value.to_le_bytes()),
-                }
-            }
+            _ => push_scalar(self.number(), scalar, out),
         }
     }
 }

@@ -151,8 +151,8 @@ fn insert(
         }
         let value_type = match table.types[0] {
             ValueType::Text => ValueType::Text,
-            ValueType::LittleEndian(_) => ValueType::LittleEndian(new_type(slot)),
             ValueType::BigEndian(_) => ValueType::BigEndian(new_type(slot)),
+            _ => ValueType::LittleEndian(new_type(slot)),
         };
         if value_type == ValueType::Text {
             out.extend_from_slice(separator_before(layout, bytes, last.start));

@@ -33,11 +33,69 @@ impl Scalar {
 }
 
 /// How a number is written down.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum ValueType {
     Text,
     LittleEndian(Scalar),
     BigEndian(Scalar),
+    /// `n_bits` bits of one byte, from bit `first` on: a whole number that is only read.
+    Bits {
+        first: u8,
+        n_bits: u8,
+    },
+    /// A little-endian number of steps that stands for another number, which is only read.
+    Scaled(Scalar, Scale),
+}
+
+/// What number of steps stands for what: `(steps + shift) * multiplier / divisor + offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Scale {
+    shift: f64,
+    multiplier: f64,
+    divisor: f64,
+    offset: f64,
+    /// The number of steps that stands for no value; NaN when each stands for one.
+    pub no_data: f64,
+}
+
+impl Scale {
+    /// `steps * step + offset`. With a step of a decimal place and an offset of whole steps the result is the `f64` next to the
+    /// decimal number: what has millimetres in the file has no more digits anywhere else.
+    pub fn new(step: f64, offset: f64) -> Self {
+        // Beyond 22, powers of ten are no `f64`.
+        let divisor = (0..=22).map(|places| 10.0_f64.powi(places));
+        let exact = divisor.filter(|divisor| step == 1.0 / divisor).find_map(|divisor| {
+            let shift = (offset * divisor).round();
+            // Both summands are whole numbers below 2^52, so that their sum is one.
+            (shift.abs() < 4.5e15 && shift / divisor == offset).then_some((shift, divisor))
+        });
+        let (shift, multiplier, divisor, offset) = match exact {
+            Some((shift, divisor)) => (shift, 1.0, divisor, 0.0),
+            None => (0.0, step, 1.0, offset),
+        };
+        Self {
+            shift,
+            multiplier,
+            divisor,
+            offset,
+            no_data: f64::NAN,
+        }
+    }
+
+    /// The number that `steps` stand for.
+    #[inline]
+    pub fn value(self, steps: f64) -> f64 {
+        if steps == self.no_data {
+            return f64::NAN;
+        }
+        (steps + self.shift) * self.multiplier / self.divisor + self.offset
+    }
+
+    /// The steps nearest to a number, as a number that may have a fraction.
+    #[inline]
+    pub fn steps(self, value: f64) -> f64 {
+        (value - self.offset) * self.divisor / self.multiplier - self.shift
+    }
 }
 
 macro_rules! from_bytes {
@@ -63,12 +121,17 @@ impl ValueType {
         match self {
             Self::Text => None,
             Self::LittleEndian(scalar) | Self::BigEndian(scalar) => Some(scalar),
+            Self::Bits { .. } => Some(Scalar::UChar),
+            Self::Scaled(..) => Some(Scalar::Double),
         }
     }
 
     /// Size in bytes; 0 for text, which has none.
     pub fn size(self) -> usize {
-        self.scalar().map_or(0, Scalar::size)
+        match self {
+            Self::Scaled(steps, _) => steps.size(),
+            _ => self.scalar().map_or(0, Scalar::size),
+        }
     }
 
     /// Reads the whole number that `bytes` are, where `f64` would round it: 64 bits, which nothing but binary files has.
@@ -90,6 +153,12 @@ impl ValueType {
             Self::Text => return parse(bytes),
             Self::LittleEndian(scalar) => from_bytes!(scalar, from_le_bytes, bytes),
             Self::BigEndian(scalar) => from_bytes!(scalar, from_be_bytes, bytes),
+            Self::Bits { first, n_bits } => {
+                let [byte] = bytes.try_into().ok()?;
+                let byte: u8 = byte;
+                f64::from((byte >> first) & (0xff >> (8 - n_bits)))
+            }
+            Self::Scaled(steps, scale) => scale.value(from_bytes!(steps, from_le_bytes, bytes)),
         })
     }
 
@@ -103,6 +172,8 @@ impl ValueType {
             Self::BigEndian(Scalar::Double) => out.extend_from_slice(&f64::from(value).to_be_bytes()),
             Self::LittleEndian(_) => out.extend_from_slice(&value.to_le_bytes()),
             Self::BigEndian(_) => out.extend_from_slice(&value.to_be_bytes()),
+            Self::Bits { .. } => out.push(value as u8),
+            Self::Scaled(steps, scale) => push_scalar(scale.steps(f64::from(value)), steps, out),
         }
     }
 
@@ -114,7 +185,7 @@ impl ValueType {
                 out.resize(first + scalar.size(), 0);
                 let lowest = match self {
                     Self::BigEndian(_) => out.len() - 1,
-                    Self::Text | Self::LittleEndian(_) => first,
+                    _ => first,
                 };
                 out[lowest] = u8::from(is_set);
             }
@@ -147,7 +218,27 @@ impl ValueType {
                     *byte ^= 0x80;
                 }
             }
+            Self::Bits { .. } | Self::Scaled(..) => {
+                self.write(-self.read(bytes).unwrap_or(0.0) as f32, out);
+            }
         }
+    }
+}
+
+/// Appends the number of a type that is nearest to `value`, little-endian; 0 for what is no number in a type of whole ones.
+pub(crate) fn push_scalar(value: f64, scalar: Scalar, out: &mut Vec<u8>) {
+    // Casts of floats give the nearest number that there is.
+    match scalar {
+        Scalar::Char => out.extend((value.round() as i8).to_le_bytes()),
+        Scalar::UChar => out.extend((value.round() as u8).to_le_bytes()),
+        Scalar::Short => out.extend((value.round() as i16).to_le_bytes()),
+        Scalar::UShort => out.extend((value.round() as u16).to_le_bytes()),
+        Scalar::Int => out.extend((value.round() as i32).to_le_bytes()),
+        Scalar::UInt => out.extend((value.round() as u32).to_le_bytes()),
+        Scalar::Long => out.extend((value.round() as i64).to_le_bytes()),
+        Scalar::ULong => out.extend((value.round() as u64).to_le_bytes()),
+        Scalar::Float => out.extend((value as f32).to_le_bytes()),
+        Scalar::Double => out.extend(value.to_le_bytes()),
     }
 }
 
