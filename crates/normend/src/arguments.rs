@@ -1,6 +1,7 @@
 //! What can be typed: the one table of commands and flags, which gives the parser and the help.
 
 pub mod bench;
+pub mod convert;
 pub mod replay;
 pub mod suspects;
 
@@ -19,6 +20,7 @@ use normend_io::{ReadError, Scan};
 use normend_render::{DisplayMode, StandardView, UpAxis};
 
 use self::bench::BenchArguments;
+use self::convert::ConvertArguments;
 use self::replay::{RehearseArguments, ReplayArguments};
 use self::suspects::SuspectsArguments;
 use crate::commands::render::{PaletteName, PictureSize};
@@ -64,7 +66,7 @@ pub struct Arguments {
 impl Arguments {
     /// What was typed. Help, version and wrong use end the program here.
     pub fn of_program() -> Self {
-        Self::try_parse().unwrap_or_else(|error| {
+        let arguments = Self::try_parse().unwrap_or_else(|error| {
             // The parser takes the second name for a command and speaks of that.
             let is_second_scan =
                 error.kind() == ErrorKind::ArgumentConflict && error.get(ContextKind::InvalidSubcommand).is_some();
@@ -76,7 +78,16 @@ impl Arguments {
                 .exit()
             }
             error.exit()
-        })
+        });
+        if let Some(command) = &arguments.command
+            && let Some(flag) = command.propagation().and_then(|typed| typed.against_auto())
+        {
+            let sentence = format!(
+                "--preset auto takes neighborhoods, normals and sources of its own: leave out {flag}, or type --preset tree"
+            );
+            usage_error(Some(command.name()), sentence).exit()
+        }
+        arguments
     }
 }
 
@@ -96,6 +107,8 @@ pub fn usage_error(name: Option<&str>, sentence: impl fmt::Display) -> clap::Err
 pub enum Command {
     /// Orient the normals of scans and write the same files with nx ny nz
     Orient(OrientArguments),
+    /// Write scans in another format, as they are
+    Convert(ConvertArguments),
     /// Count the normals that point to the wrong side
     Check(CheckArguments),
     /// List the patches that probably point to the wrong side
@@ -118,6 +131,7 @@ impl Command {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Orient(_) => "orient",
+            Self::Convert(_) => "convert",
             Self::Check(_) => "check",
             Self::Suspects(_) => "suspects",
             Self::Render(_) => "render",
@@ -125,6 +139,16 @@ impl Command {
             Self::Replay(_) => "replay",
             Self::Rehearse(_) => "rehearse",
             Self::Bench(_) => "bench",
+        }
+    }
+
+    /// How signs are to be found, where that can be typed.
+    fn propagation(&self) -> Option<PropagationArguments> {
+        match self {
+            Self::Orient(arguments) => Some(arguments.propagation),
+            Self::Replay(arguments) => Some(arguments.propagation),
+            Self::Bench(arguments) => arguments.command.propagation(),
+            Self::Check(_) | Self::Suspects(_) | Self::Render(_) | Self::Generate(_) | Self::Rehearse(_) => None,
         }
     }
 }
@@ -144,7 +168,8 @@ pub struct CommonArguments {
 /// How signs are found: a preset, and what is typed in place of its parameters.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct PropagationArguments {
-    /// A whole method; the flags below replace parts of it. Those of normals, graph and sources turn auto to tree [default: auto]
+    /// A whole method; the flags below replace parts of it. Those of normals, graph and sources are not for auto; where no preset is
+    /// named they choose tree [default: auto]
     #[arg(long, value_name = "NAME", value_parser = one_of(&Preset::ALL, Preset::name))]
     pub preset: Option<Preset>,
 
@@ -230,22 +255,35 @@ fn place(typed: &str) -> Result<DVec3, String> {
 }
 
 impl PropagationArguments {
-    /// Whether a flag was typed that the automatic method has no use for.
-    fn sets_tree(&self) -> bool {
-        self.estimator.is_some()
-            || self.k_normals.is_some()
-            || self.k_graph.is_some()
-            || self.edge_rule.is_some()
-            || self.sources.is_some()
-            || self.views.is_some()
-            || self.eta.is_some()
+    /// The first flag that was typed and that the automatic method has no use for.
+    fn of_tree(&self) -> Option<&'static str> {
+        let flags = [
+            (self.estimator.is_some(), "--estimator"),
+            (self.k_normals.is_some(), "--k-normals"),
+            (self.k_graph.is_some(), "--k-graph"),
+            (self.edge_rule.is_some(), "--edge-rule"),
+            (self.sources.is_some(), "--sources"),
+            (self.views.is_some(), "--views"),
+            (self.eta.is_some(), "--eta"),
+        ];
+        flags.into_iter().find(|(is_typed, _)| *is_typed).map(|(_, flag)| flag)
+    }
+
+    /// A flag that contradicts the automatic method, which was asked for by its name.
+    fn against_auto(&self) -> Option<&'static str> {
+        self.of_tree().filter(|_| self.preset == Some(Preset::Auto))
+    }
+
+    /// A flag that has the spanning tree take the place of the automatic method, where no preset was named.
+    pub fn turns_to_tree(&self) -> Option<&'static str> {
+        self.of_tree().filter(|_| self.preset.is_none())
     }
 
     /// `base` with what was typed in its place.
     pub fn over(self, base: Parameters) -> Parameters {
         let base = self.preset.map_or(base, Preset::parameters);
         Parameters {
-            method: if self.sets_tree() {
+            method: if self.of_tree().is_some() {
                 Method::SpanningTree
             } else {
                 base.method
@@ -279,13 +317,13 @@ The output is the file that came in, points in its order, with unit normals nx n
 under their own names; one that fails does not stop the others, the exit code is 1 then. A file that exists is replaced \
 only with --overwrite.
 
-The output's extension says its format; without one, or with the input's, it is the input's. From .ply to text (.xyz .txt \
-.asc .pts .csv) or back go positions and normals only.
+The output's extension says its format; without one, or with the input's, it is the input's. In another format goes all that \
+it can hold; the rest is named before the work.
 
 The report (--json) has a line for each input: an object with input, output, points, left_out (rows without finite \
 coordinates), components, sources (places where signs start), voted_sources (those found by visibility), \
 without_evidence (components that no evidence tells the side of), undecided (points whose sign is no more than a guess; null \
-where the method does not know), rule (what decided the sides, in words), found_station ([x, y, z] where all was scanned from, \
+where the method does not know), rule (what decided the sides, in words), lost (what the output's format cannot hold), found_station ([x, y, z] where all was scanned from, \
 if --rule auto found it, else null), parameters, seconds (read, neighbors, normals, \
 sources where voted, graph, tree, signs, write, total) and peak_rss_bytes (of the program so far; null where the system \
 does not tell). A failed input has input and error.
@@ -323,6 +361,10 @@ pub struct OrientArguments {
     /// side is no more than a guess). For the preset auto; to PLY from PLY, or text whose columns have names
     #[arg(long)]
     pub confidence: bool,
+
+    /// Refuse to write what the output's format cannot hold all of
+    #[arg(long)]
+    pub strict: bool,
 
     /// Write a report, a JSON object a line, to FILE or to standard output (-)
     #[arg(long, value_name = "FILE")]

@@ -105,12 +105,18 @@ impl Drop for Bar {
 
 /// An error in one sentence, causes included.
 pub fn in_words(error: &anyhow::Error) -> String {
-    // The errors of files tell their causes themselves.
-    if error.is::<ReadError>() || error.is::<WriteError>() {
-        error.to_string()
-    } else {
-        format!("{error:#}")
+    let mut words: Vec<String> = Vec::new();
+    for cause in error.chain() {
+        words.push(match cause.downcast_ref::<std::io::Error>() {
+            Some(error) => normend_io::io_words(error),
+            None => cause.to_string(),
+        });
+        // The errors of files tell their causes themselves.
+        if cause.is::<ReadError>() || cause.is::<WriteError>() {
+            break;
+        }
     }
+    words.join(": ")
 }
 
 /// `n` of something whose plural ends in s: `1 point`, `1,200 points`.

@@ -18,7 +18,7 @@ use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
 use arguments::{Arguments, Command};
-use commands::{Outcome, WrongUse, bench, check, generate, orient, render, replay, suspects, wrong_use};
+use commands::{Outcome, WrongUse, bench, check, convert, generate, orient, render, replay, suspects, wrong_use};
 
 /// The exit code of a program that was interrupted, by the shells' convention: 128 + SIGINT.
 const INTERRUPTED: u8 = 130;
@@ -50,6 +50,7 @@ fn run(arguments: Arguments) -> anyhow::Result<Outcome> {
         }
         Some(Command::Orient(arguments)) => orient::run(arguments),
         Some(Command::Check(arguments)) => check::run(&arguments),
+        Some(Command::Convert(arguments)) => convert::run(&arguments),
         Some(Command::Suspects(arguments)) => suspects::run(&arguments),
         Some(Command::Render(arguments)) => render::run(&arguments),
         Some(Command::Generate(arguments)) => generate::run(&arguments),

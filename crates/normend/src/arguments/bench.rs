@@ -31,6 +31,18 @@ pub enum BenchCommand {
     Paper(PaperArguments),
 }
 
+impl BenchCommand {
+    /// How signs are to be found, where that can be typed.
+    pub(super) fn propagation(&self) -> Option<PropagationArguments> {
+        match self {
+            Self::Quality(arguments) => Some(arguments.propagation),
+            Self::Clicks(arguments) => Some(arguments.propagation),
+            Self::Suspects(arguments) => Some(arguments.propagation),
+            Self::Clouds(_) | Self::Paper(_) => None,
+        }
+    }
+}
+
 /// `normend bench clouds`.
 #[derive(Debug, Args)]
 #[command(after_help = "\

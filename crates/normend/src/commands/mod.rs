@@ -1,7 +1,9 @@
 //! What each command means.
 
+pub mod batch;
 pub mod bench;
 pub mod check;
+pub mod convert;
 pub mod generate;
 pub mod orient;
 pub mod render;
@@ -15,7 +17,7 @@ use anyhow::{Context, bail};
 use normend_io::FileFormat;
 
 use crate::arguments::CommonArguments;
-use crate::console;
+use crate::console::{self, Bar};
 
 /// How a command ended when nothing stopped it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,9 +87,16 @@ fn check_may_write(output: &Path, overwrite: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Whether both paths name the same existing file.
-fn is_same_file(a: &Path, b: &Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+/// Says of a file that is about to be replaced that it has other names, which keep the old content.
+fn say_other_names(output: &Path, bar: &Bar) {
+    let n_others = normend_io::n_other_names(output);
+    if n_others > 0 {
+        let others = console::counted(n_others as usize, "other name");
+        bar.say(&format!(
+            "{} has {others} (hard links): what is written gets this name alone, the rest keeps the old content",
+            output.display()
+        ));
+    }
 }
 
 /// The name of a file for the title of a bar.

@@ -14,7 +14,7 @@ use normend_render::{
     Camera, DisplayMode, DrawSettings, HeadlessDevice, MAX_PICTURE_SIDE, Palette, RenderError, SplatRenderer,
 };
 
-use super::{Outcome, check_is_file_name, check_may_write, is_same_file, prepare, title_of, wrong_use};
+use super::{Outcome, check_is_file_name, check_may_write, prepare, title_of, wrong_use};
 use crate::arguments::RenderArguments;
 use crate::console::Bar;
 
@@ -98,7 +98,7 @@ impl PaletteName {
 /// Wrong use, a scan that cannot be read, no graphics driver, a picture that cannot be written; Ctrl-C.
 pub fn run(arguments: &RenderArguments) -> anyhow::Result<Outcome> {
     check_is_file_name(&arguments.output)?;
-    if is_same_file(&arguments.input, &arguments.output) {
+    if normend_io::is_same_file(&arguments.input, &arguments.output) {
         return Err(wrong_use(
             "the picture would take the place of the scan: name another output",
         ));

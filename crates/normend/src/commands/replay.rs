@@ -12,11 +12,12 @@ use normend_core::evidence::Known;
 use normend_core::progress::Part;
 use normend_core::{EditError, Parameters, Progress, Propagation, SideRule, Silent};
 use normend_io::recipe::{self, End, Event, Recipe};
-use normend_io::{Scan, WriteOptions};
+use normend_io::{Scan, WriteOptions, is_same_file};
 use serde::Serialize;
 
-use super::orient::{open_report, serialize_parameters};
-use super::{Outcome, check_may_write, check_scan_name, is_same_file, prepare, title_of, wrong_use};
+use super::batch::open_report;
+use super::orient::serialize_parameters;
+use super::{Outcome, check_may_write, check_scan_name, prepare, say_other_names, title_of, wrong_use};
 use crate::arguments::replay::{RehearseArguments, ReplayArguments};
 use crate::console::{self, Bar, counted};
 use crate::memory::peak_rss_bytes;
@@ -166,9 +167,11 @@ fn replay(arguments: &ReplayArguments, bar: &Bar) -> anyhow::Result<Replayed> {
     let options = WriteOptions {
         rule: rule.clone(),
         overwrite_input: arguments.overwrite,
+        ..WriteOptions::default()
     };
     let writing = Part::new(bar, 0.9..1.0);
     writing.report(0.0)?;
+    say_other_names(&arguments.output, bar);
     session
         .scan
         .write_with_confidence(&normals, sureness.as_deref(), &arguments.output, &options, &writing)?;

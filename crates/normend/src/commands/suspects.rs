@@ -13,8 +13,8 @@ use normend_core::{Parameters, Propagation, SideRule};
 use normend_io::Scan;
 use serde::Serialize;
 
-use super::orient::open_report;
-use super::{Outcome, is_same_file, prepare, title_of, wrong_use};
+use super::batch::open_report;
+use super::{Outcome, prepare, title_of, wrong_use};
 use crate::arguments::suspects::SuspectsArguments;
 use crate::console::{Bar, counted};
 
@@ -60,7 +60,7 @@ pub fn run(arguments: &SuspectsArguments) -> anyhow::Result<Outcome> {
         ));
     }
     let json = arguments.json.as_deref();
-    if json.is_some_and(|report| is_same_file(report, &arguments.input)) {
+    if json.is_some_and(|report| normend_io::is_same_file(report, &arguments.input)) {
         return Err(wrong_use(
             "the report of --json would take the place of the scan: give it another name",
         ));
@@ -125,7 +125,7 @@ pub fn run(arguments: &SuspectsArguments) -> anyhow::Result<Outcome> {
 
 /// A suspect in the file's coordinates and rows.
 fn row(suspect: &Suspect, scan: &Scan) -> Row {
-    let position = scan.cloud.positions()[suspect.point as usize];
+    let position = scan.cloud.relative(suspect.point as usize);
     let row = match &scan.rows {
         Some(rows) => rows[suspect.point as usize],
         None => suspect.point,
@@ -134,7 +134,7 @@ fn row(suspect: &Suspect, scan: &Scan) -> Row {
         score: suspect.score,
         points: suspect.points.len(),
         row,
-        center: (scan.cloud.origin() + position.as_dvec3()).to_array(),
+        center: (scan.cloud.origin() + position).to_array(),
         kind: suspect.kind.name(),
         seam: suspect.seam,
         votes_for: suspect.votes_for,

@@ -90,8 +90,7 @@ fn write(points: &BenchmarkPoints, files: &Files, progress: &dyn Progress) -> an
     let normals = Some(points.shape.normals.as_slice());
     write_points(&files.truth, positions, normals, &Part::new(progress, 0.4..1.0))?;
     if !points.stations.is_empty() {
-        fs::write(&files.sensors, sensors(&points.stations))
-            .with_context(|| format!("cannot write {}", files.sensors.display()))?;
+        normend_io::write_bytes(&files.sensors, sensors(&points.stations).as_bytes())?;
     }
     Ok(())
 }

@@ -1,7 +1,6 @@
 //! `normend bench paper`: the figures of Liu et al. as tables, on clouds with a known truth.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::io::{self, Write as _};
 
 use anyhow::Context;
@@ -159,7 +158,7 @@ pub fn run(arguments: &PaperArguments) -> anyhow::Result<Outcome> {
     drop(bar);
     match &arguments.output {
         Some(output) => {
-            fs::write(output, &text).with_context(|| format!("cannot write {}", output.display()))?;
+            normend_io::write_bytes(output, text.as_bytes())?;
         }
         None => io::stdout()
             .lock()

@@ -10,8 +10,9 @@ use normend_core::metrics::{self, compare, wrong_regions};
 use normend_core::{Document, EditError, Neighbors, Parameters, Progress, Propagation};
 use serde::Serialize;
 
+use super::super::batch::open_report;
 use super::super::check::{check_same_points, normals_of};
-use super::super::orient::{open_report, serialize_parameters};
+use super::super::orient::serialize_parameters;
 use super::super::{Outcome, prepare, title_of};
 use super::folder::{Case, Found, find, for_each_case, n_threads};
 use crate::arguments::bench::QualityArguments;
