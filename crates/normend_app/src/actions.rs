@@ -131,7 +131,8 @@ impl App {
             Command::Export => {
                 if let Some(session) = &self.session {
                     let suggested = session.suggested_export(self.settings.settings.folder(Purpose::Export));
-                    let window = ExportWindow::new(&suggested, session.scan.path().cloned());
+                    let window = ExportWindow::new(&suggested, session.scan.path().cloned())
+                        .with_changed_input(session.scan.is_changed_on_disk());
                     let window = window.with_confidence(session.knows_confidence());
                     self.windows.modal = Some(Modal::Export(window));
                 }
@@ -560,6 +561,7 @@ impl App {
         self.messages.log_error(problem.clone());
         let Some(session) = &self.session else { return };
         let window = ExportWindow::after_failure(order, session.scan.path().cloned(), problem)
+            .with_changed_input(session.scan.is_changed_on_disk())
             .with_confidence(session.knows_confidence());
         self.windows.modal = Some(Modal::Export(window));
     }

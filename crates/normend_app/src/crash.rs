@@ -275,6 +275,7 @@ fn write_report(folder: &Path, run: &Run, panic: &str, ends: Ends, now: &jiff::Z
         text += &format!("- {message}\n");
     }
     text += &format!("\nBacktrace:\n{}\n", Backtrace::force_capture());
+    // Into its place at once: nothing stands there that could be lost, and whoever crashes does as little as possible.
     fs::write(&file, without_home(text))?;
     for old in reports(folder, ends).into_iter().rev().skip(N_REPORTS) {
         // It is only one too many; the next report tries again.

@@ -18,7 +18,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use normend_core::{EditKind, StateChange};
-use normend_io::recipe::{self, Event, Head, LineWriter};
+use normend_io::recipe::{self, Event, Head, LineWriter, Recipe};
 use tempfile::NamedTempFile;
 
 use self::found::Offer;
@@ -88,6 +88,8 @@ struct Out {
     news: Option<News>,
     /// The file is shortened when it is longer.
     shorten_above: u64,
+    /// The head in the file is not [`Self::head`] any more.
+    has_old_head: bool,
 }
 
 impl Journal {
@@ -105,6 +107,7 @@ impl Journal {
             failed: None,
             news: None,
             shorten_above: LEAST_TO_SHORTEN,
+            has_old_head: false,
         })
     }
 
@@ -140,6 +143,7 @@ impl Journal {
             pending,
             failed: None,
             news: None,
+            has_old_head: false,
         })
     }
 
@@ -181,6 +185,22 @@ impl Journal {
     pub fn exported(&mut self) {
         if lock(&self.out).lines.is_some() {
             self.write(|lines| lines.event(&Event::Exported));
+        }
+    }
+
+    /// The scan's file has another content from now on, with the same points: it was written over with what was exported. The journal
+    /// is found with that one; its file is written anew for it, soon.
+    pub fn follow(&mut self, scan: recipe::ScanIdentity) {
+        let mut out = lock(&self.out);
+        if out.head.scan == scan {
+            return;
+        }
+        out.head.scan = scan;
+        out.has_old_head = out.lines.is_some();
+        drop(out);
+        if let Some(sync) = &self.sync {
+            // Without its thread the journal is known for one of the former content.
+            let _ = sync.send(());
         }
     }
 
@@ -394,9 +414,12 @@ fn keep_synced(out: &Mutex<Out>, asked: &mpsc::Receiver<()>) {
             }
         };
         sync(out, File::sync_data);
-        if !is_last && let Err(error) = shorten(out) {
-            // The long one is as good.
-            tracing::warn!("the journal was not shortened: {error}");
+        let must_be_anew = lock(out).has_old_head;
+        if (!is_last || must_be_anew)
+            && let Err(error) = write_anew(out)
+        {
+            // The long one is as good. One with an old head is offered as of a former content.
+            tracing::warn!("the journal was not written anew: {error}");
         }
     }
 }
@@ -425,18 +448,19 @@ fn sync(out: &Mutex<Out>, sync_data: impl Fn(&File) -> io::Result<()>) {
     }
 }
 
-/// Writes a journal that is long once more, without what nobody can reach.
-fn shorten(out: &Mutex<Out>) -> io::Result<()> {
-    let (path, n_bytes) = {
+/// Writes a journal that is long, or of another scan than its head says, once more, without what nobody can reach.
+fn write_anew(out: &Mutex<Out>) -> io::Result<()> {
+    let (path, n_bytes, head) = {
         let mut out = lock(out);
         let (n_bytes, above) = (out.n_bytes, out.shorten_above);
-        let Some((_, path)) = out.file.as_ref().filter(|_| n_bytes > above) else {
+        let is_due = n_bytes > above || out.has_old_head;
+        let Some((_, path)) = out.file.as_ref().filter(|_| is_due) else {
             return Ok(());
         };
-        let path = path.clone();
+        let (path, head) = (path.clone(), out.head.clone());
         // Whatever becomes of this attempt, the next comes when there is as much again.
         out.shorten_above = 2 * n_bytes;
-        (path, n_bytes)
+        (path, n_bytes, head)
     };
     let mut bytes = Vec::new();
     File::open(&path)?.take(n_bytes).read_to_end(&mut bytes)?;
@@ -445,7 +469,8 @@ fn shorten(out: &Mutex<Out>) -> io::Result<()> {
         return Err(io::Error::other("it is not as it was written"));
     }
     drop(bytes);
-    let (writer, bytes) = reading.recipe.shortened(MOST_KEPT)?.encode()?;
+    let shortened = reading.recipe.shortened(MOST_KEPT)?;
+    let (writer, bytes) = Recipe { head, ..shortened }.encode()?;
     let folder = path.parent().unwrap_or(Path::new("."));
     let temporary = beside(folder, &bytes)?;
     temporary.as_file().sync_data()?;
@@ -456,9 +481,10 @@ fn shorten(out: &Mutex<Out>) -> io::Result<()> {
         out.lines = Some(writer);
         (out.n_bytes, out.n_synced) = (bytes.len() as u64, bytes.len() as u64);
         out.is_unsynced = false;
+        out.has_old_head = false;
         out.succeed();
     }
-    // Else there was an edit meanwhile; the present file has it.
+    // Else there was an edit meanwhile; the present file has it, and it is tried again after that one's sync.
     out.shorten_above = LEAST_TO_SHORTEN.max(2 * out.n_bytes);
     Ok(())
 }

@@ -83,6 +83,12 @@ impl App {
         for problem in findings.problems {
             self.messages.error(problem);
         }
+        // Not the journal of the scan that this editor had open until now.
+        if findings.held.iter().any(|path| found::is_held(path)) {
+            self.messages.note(
+                "Another editor has edits of this scan: each exports only its own, so export to different files.",
+            );
+        }
         session.offers = findings.offers.into();
         let is_same = session.offers.front().is_some_and(|offer| offer.is_same);
         if std::mem::take(&mut self.restores_unasked) && is_same {

@@ -159,8 +159,13 @@ impl Session {
         if is_newest {
             self.exported_accepted = self.document.state().accepted.clone();
         }
-        if let Some(journal) = self.journal.as_mut().filter(|_| is_newest) {
-            journal.exported();
+        let scan = self.identity();
+        if let Some(journal) = &mut self.journal {
+            if is_newest {
+                journal.exported();
+            }
+            // The export may have replaced the file that was opened.
+            journal.follow(scan);
         }
     }
 

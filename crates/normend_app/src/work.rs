@@ -192,6 +192,7 @@ impl Work {
         let options = WriteOptions {
             rule: session.rule()?,
             overwrite_input: order.overwrite_input,
+            overwrite_changed: order.overwrite_changed,
         };
         let (target, with_confidence) = (order.path.clone(), order.with_confidence);
         let job = Job::start(ctx, "export", "Writing", move |progress| {

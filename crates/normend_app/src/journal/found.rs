@@ -40,6 +40,8 @@ pub struct Findings {
     pub offers: Vec<Offer>,
     /// What cannot be read, in words.
     pub problems: Vec<String>,
+    /// Journals of the same scan that an editor held.
+    pub held: Vec<PathBuf>,
 }
 
 impl Offer {
@@ -79,13 +81,16 @@ impl Offer {
     /// what cannot be read.
     ///
     /// # Errors
-    /// What the system says.
-    pub fn keep_damaged(&self) -> std::io::Result<PathBuf> {
+    /// In words.
+    pub fn keep_damaged(&self) -> Result<PathBuf, String> {
         let copy = self.path.with_extension("damaged");
         // Not by its name: where locks bind, only who holds the file can read it.
         let mut file = &self.file;
-        file.seek(SeekFrom::Start(0))?;
-        std::io::copy(&mut file, &mut File::create(&copy)?)?;
+        let mut bytes = Vec::new();
+        file.seek(SeekFrom::Start(0))
+            .and_then(|_| file.read_to_end(&mut bytes))
+            .map_err(|error| error.to_string())?;
+        normend_io::write_bytes(&copy, &bytes).map_err(|error| error.to_string())?;
         Ok(copy)
     }
 
@@ -125,13 +130,16 @@ pub fn find(folder: &Path, scan: &ScanIdentity, patience: Duration) -> Findings 
         if path.extension().is_none_or(|extension| extension != EXTENSION) {
             continue;
         }
-        let may_be_same = name.starts_with(hash);
-        if !may_be_same && !is_of_path(&path, scan) {
+        let head = head_of(&path);
+        let may_be_same = name.starts_with(hash) || head.as_ref().is_some_and(|head| head.is_same_content(scan));
+        let is_of_path = scan.path.is_some() && head.is_some_and(|head| head.path == scan.path);
+        if !may_be_same && !is_of_path {
             continue;
         }
         match take(&path, scan, may_be_same.then_some(deadline)) {
-            Ok(None) => {}
-            Ok(Some(offer)) => findings.offers.push(offer),
+            Ok(Taken::Useless) => {}
+            Ok(Taken::Held) => findings.held.push(path),
+            Ok(Taken::Offer(offer)) => findings.offers.push(*offer),
             Err(problem) => findings.problems.push(problem),
         }
     }
@@ -141,18 +149,33 @@ pub fn find(folder: &Path, scan: &ScanIdentity, patience: Duration) -> Findings 
     findings
 }
 
-/// Whether the first line says that the scan was at the same path; its content is another one then.
-fn is_of_path(journal: &Path, scan: &ScanIdentity) -> bool {
-    let Some(path) = &scan.path else { return false };
-    let Ok(file) = File::open(journal) else { return false };
+/// The scan that the first line of a journal names: at the same path it may be of another content, and one that was written over is
+/// known by its head alone.
+fn head_of(journal: &Path) -> Option<ScanIdentity> {
     let mut line = Vec::new();
-    let read = BufReader::new(file.take(MOST_HEAD)).read_until(b'\n', &mut line);
-    let head = read.ok().and_then(|_| recipe::parse(&line, "journal").ok());
-    head.is_some_and(|reading| reading.recipe.head.scan.path.as_ref() == Some(path))
+    let file = File::open(journal).ok()?.take(MOST_HEAD);
+    BufReader::new(file).read_until(b'\n', &mut line).ok()?;
+    let reading = recipe::parse(&line, "journal").ok()?;
+    Some(reading.recipe.head.scan)
 }
 
-/// Locks and reads a journal; `None` when it is held by another editor, not of this scan, or of no use any more.
-fn take(path: &Path, scan: &ScanIdentity, deadline: Option<Instant>) -> Result<Option<Offer>, String> {
+/// Whether an editor holds this journal now.
+pub fn is_held(journal: &Path) -> bool {
+    let file = OpenOptions::new().read(true).write(true).open(journal);
+    file.is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
+}
+
+/// What became of a journal that was looked at.
+enum Taken {
+    /// Another editor holds it.
+    Held,
+    /// It is not of this scan, or nobody needs it any more.
+    Useless,
+    Offer(Box<Offer>),
+}
+
+/// Locks and reads a journal.
+fn take(path: &Path, scan: &ScanIdentity, deadline: Option<Instant>) -> Result<Taken, String> {
     let unreadable =
         |error: &dyn std::fmt::Display| format!("A journal of this scan cannot be used. {}: {error}.", path.display());
     let mut file = OpenOptions::new()
@@ -166,7 +189,7 @@ fn take(path: &Path, scan: &ScanIdentity, deadline: Option<Instant>) -> Result<O
             Err(TryLockError::WouldBlock) if deadline.is_some_and(|deadline| Instant::now() < deadline) => {
                 std::thread::sleep(LOCK_POLL);
             }
-            Err(TryLockError::WouldBlock) => return Ok(None),
+            Err(TryLockError::WouldBlock) => return Ok(Taken::Held),
         }
     }
     let modified = file.metadata().and_then(|metadata| metadata.modified()).ok();
@@ -178,20 +201,23 @@ fn take(path: &Path, scan: &ScanIdentity, deadline: Option<Instant>) -> Result<O
         .map_err(|error| format!("A journal of this scan cannot be used. {error}."))?;
     let is_same = reading.recipe.head.scan.is_same_content(scan);
     if !is_same && reading.recipe.head.scan.path != scan.path {
-        return Ok(None);
+        return Ok(Taken::Useless);
     }
     let is_of_use = !reading.recipe.is_exported() && !reading.recipe.history().0.is_empty();
     if !is_of_use && reading.end == End::Whole {
         // One that stays is looked at again the next time.
         let _ = fs::remove_file(path);
     }
-    Ok(is_of_use.then(|| Offer {
+    if !is_of_use {
+        return Ok(Taken::Useless);
+    }
+    Ok(Taken::Offer(Box::new(Offer {
         reading,
         is_same,
         modified,
         path: path.to_path_buf(),
         file,
-    }))
+    })))
 }
 
 /// Removes what an editor left behind that ended while it made a journal.

@@ -275,7 +275,7 @@ fn a_long_journal_is_shortened_to_what_can_be_reached() {
     let path = journal.path().unwrap();
     let n_bytes = fs::metadata(&path).unwrap().len();
     lock(&journal.out).shorten_above = 100;
-    shorten(&journal.out).unwrap();
+    write_anew(&journal.out).unwrap();
     assert!(fs::metadata(&path).unwrap().len() < n_bytes / 5);
     assert!(find_in(folder.path()).offers.is_empty(), "the new file is held too");
     document.redo().unwrap();

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use egui::{Checkbox, Label, RichText, TextEdit, Ui};
+use normend_io::{is_same_file, n_other_names};
 
 use super::modal;
 use super::open_path::typed_path;
@@ -15,6 +16,9 @@ const PROBLEM_HEIGHT: f32 = 38.0;
 const CONFIDENCE: &str = "Adds two values to each point: confidence, from 0 to 1, how sure the automatic method was of \
                           its side before any mend, and oriented, 0 where that was no more than a guess.\n\
                           To PLY from PLY, or text whose columns have names.";
+/// What is to be known before the opened scan is replaced.
+const INPUT_CHANGED: &str = "Another program has changed this file since it was opened. The export is made of what was opened: type \
+                             another name to keep both.";
 /// Why there is none.
 pub(crate) const NO_CONFIDENCE: &str =
     "Only the automatic method knows how sure it is: propagate with the preset Automatic first";
@@ -33,6 +37,10 @@ pub struct ExportWindow {
     wants_focus: bool,
     checked: Option<(String, Existing)>,
     problem: Option<String>,
+    /// Another program has changed the input since it was opened.
+    is_input_changed: bool,
+    /// Other names of the file at the target, which keep the old content.
+    n_other_names: u64,
 }
 
 /// What the window is about.
@@ -91,6 +99,8 @@ pub struct ExportOrder {
     pub path: PathBuf,
     /// The user agreed to replace the file that was opened.
     pub overwrite_input: bool,
+    /// And that the changes of another program are lost with it.
+    pub overwrite_changed: bool,
     /// How sure the automatic method is of each point is written too.
     pub with_confidence: bool,
 }
@@ -108,6 +118,16 @@ impl ExportWindow {
             wants_focus: true,
             checked: None,
             problem: None,
+            is_input_changed: false,
+            n_other_names: 0,
+        }
+    }
+
+    /// The same window about an input that another program has changed since it was opened, or not.
+    pub fn with_changed_input(self, is_input_changed: bool) -> Self {
+        Self {
+            is_input_changed,
+            ..self
         }
     }
 
@@ -159,9 +179,10 @@ impl ExportWindow {
             None => Existing::Nothing,
             Some(path) if path.is_dir() => Existing::Folder,
             Some(path) if !path.exists() => Existing::Nothing,
-            Some(path) if self.input.as_ref().is_some_and(|input| same_file(input, &path)) => Existing::Input,
+            Some(path) if self.input.as_ref().is_some_and(|input| is_same_file(input, &path)) => Existing::Input,
             Some(_) => Existing::File,
         };
+        self.n_other_names = typed_path(&self.path).map_or(0, |path| n_other_names(&path));
         self.checked = Some((self.path.clone(), existing));
         existing
     }
@@ -212,6 +233,7 @@ impl ExportWindow {
                 Existing::Nothing | Existing::Folder => return,
                 Existing::Input if !self.words.may_replace_input => return,
                 Existing::File => "Replace the existing file",
+                Existing::Input if self.is_input_changed => "Replace the scan, and lose those changes",
                 Existing::Input => "Replace the scan that was opened",
             };
             if ui.checkbox(&mut self.replace, replace).changed() {
@@ -236,6 +258,12 @@ impl ExportWindow {
             }
             if let Some(problem) = &self.problem {
                 ui.add(Label::new(RichText::new(problem).color(ui.visuals().error_fg_color)).wrap());
+            } else if existing == Existing::Input && self.is_input_changed {
+                ui.add(Label::new(RichText::new(INPUT_CHANGED).color(ui.visuals().warn_fg_color)).wrap());
+            } else if self.n_other_names > 0 && !is_never {
+                let others = theme::counted(self.n_other_names, "other name", "other names");
+                let note = format!("This file has {others} (hard links). They keep the old content.");
+                ui.add(Label::new(RichText::new(note).weak()).wrap());
             }
         });
         ui.add_space(SPACE_S);
@@ -251,6 +279,7 @@ impl ExportWindow {
                         decision = Decision::Export(ExportOrder {
                             path,
                             overwrite_input: existing == Existing::Input,
+                            overwrite_changed: existing == Existing::Input && self.is_input_changed,
                             with_confidence: self.with_confidence,
                         });
                     }
@@ -265,13 +294,6 @@ impl ExportWindow {
             }
         });
         decision
-    }
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    match (a.canonicalize(), b.canonicalize()) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => a == b,
     }
 }
 

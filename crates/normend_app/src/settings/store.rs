@@ -145,8 +145,11 @@ fn read(folder: &Path) -> (Settings, Option<String>) {
                 return (settings, None);
             }
             // The next change writes the file, so what the user wrote is kept beside it.
-            let kept = match fs::copy(&file, &aside) {
-                Ok(_) => format!("a copy is {}", aside.display()),
+            let copied = fs::read(&file)
+                .map_err(|error| error.to_string())
+                .and_then(|bytes| normend_io::write_bytes(&aside, &bytes).map_err(|error| error.to_string()));
+            let kept = match copied {
+                Ok(()) => format!("a copy is {}", aside.display()),
                 Err(error) => format!("it could not be copied: {error}"),
             };
             let problem = format!(
@@ -233,10 +236,7 @@ fn write(folder: &Path, before: &Settings, now: &Settings) -> Result<(), Box<dyn
         }
         Err(_) => now,
     };
-    // Beside it first, then renamed: a full disk leaves the old settings whole.
-    let beside = folder.join(format!("{FILE_NAME}.{}.new", std::process::id()));
-    fs::write(&beside, toml::to_string_pretty(&table)?)?;
-    fs::rename(&beside, &file)?;
+    normend_io::write_bytes(&file, toml::to_string_pretty(&table)?.as_bytes())?;
     Ok(())
 }
 
