@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from plyfile import PlyData
 
-from clouds import CLOUDS, Cloud, write_plain_ply
+from clouds import CLOUDS, NAMES, Cloud, write_plain_ply
 from compare import FLOAT, SHORTEST, Kept, Outcome, compare
 
 NORMEND = os.environ.get("NORMEND", "normend")
@@ -92,6 +92,8 @@ class Case:
     # The file that Normend starts from, if it is no binary PLY, and its extension.
     write_source: Callable[[Cloud, Path], None] = write_plain_ply
     source_extension: str = ".ply"
+    # What values are called in its files, where that is not their name here.
+    called: dict[str, str] = field(default_factory=dict)
     # The values that clouds are given; None: all.
     only: tuple[str, ...] | None = None
     # Clouds that are not tried, with the reason for the table.
@@ -110,10 +112,14 @@ class Case:
         if self.extension == ".ply":
             ours = folder / "ours.csv"
             normend(theirs, ours)
-            return compare(cloud, read_table(ours, ","), [self.writes, TO_TABLE])
+            return compare(cloud, self._renamed(read_table(ours, ",")), [self.writes, TEXT])
         ours = folder / "ours.ply"
         normend(theirs, ours)
-        return compare(cloud, read_ply(ours), [self.writes, TO_PLY])
+        return compare(cloud, self._renamed(read_ply(ours)), [self.writes, PLY])
+
+    def _renamed(self, cloud: Cloud) -> Cloud:
+        names = {theirs: name for name, theirs in self.called.items()}
+        return replace(cloud, values={names.get(name, name): of for name, of in cloud.values.items()})
 
     def _they_read_theirs(self, cloud: Cloud, folder: Path) -> Outcome:
         theirs, ours = folder / f"theirs{self.extension}", folder / f"ours{self.extension}"
@@ -157,17 +163,15 @@ class Case:
         return row
 
 
-# Other values follow once text keeps them.
-TO_TABLE = Kept(points=SHORTEST, normals=FLOAT)
-# What comes through text that Normend makes of a PLY.
-TEXT = Kept(points=SHORTEST, normals=SHORTEST)
-TO_PLY = Kept(normals=FLOAT)
+# What comes through text and through a PLY that Normend makes of another format: all.
+TEXT = Kept(points=SHORTEST, normals=SHORTEST, values=dict.fromkeys(NAMES, SHORTEST))
+PLY = Kept(normals=FLOAT, values=dict.fromkeys(NAMES, SHORTEST))
 
 
 def version_of(program: str) -> str:
     """The version of a Python package, or of a program from Debian without the packager's part."""
     try:
-        return metadata.version(program)
+        return metadata.version(program).split(".post")[0]
     except metadata.PackageNotFoundError:
         package = {"PCL": "pcl-tools", "CloudCompare": "cloudcompare"}[program]
         full = run("dpkg-query", "-W", "-f", "${Version}", package)

@@ -75,6 +75,8 @@ def _clouds() -> dict[str, Cloud]:
 
 
 CLOUDS = _clouds()
+# Of their values.
+NAMES = tuple(CLOUDS["local"].values)
 
 
 def write_plain_ply(cloud: Cloud, path, encoding="binary_little_endian") -> None:

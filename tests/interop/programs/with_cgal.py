@@ -32,6 +32,6 @@ def write(cloud: Cloud, path) -> None:
 HOLES = {"holes": "it ends at the first nan"}
 
 CASES = [
-    Case(program="cgal", format="PLY, little-endian", extension=".ply", read=read, write=write),
-    Case(program="cgal", format="text, x y z nx ny nz", extension=".xyz", read=read, write=write, made=TEXT, without=HOLES),
+    Case(program="CGAL", format="PLY, little-endian", extension=".ply", read=read, write=write),
+    Case(program="CGAL", format="text, x y z nx ny nz", extension=".xyz", read=read, write=write, made=TEXT, only=(), without=HOLES),
 ]

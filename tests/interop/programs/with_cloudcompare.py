@@ -1,10 +1,8 @@
 """CloudCompare, by its command line: PLY and text."""
 
 from case import TEXT, Case, read_ply, run
-from clouds import COLORS, CLOUDS, Cloud, write_plain_ply
-from compare import FLOAT, Kept, same, within
-
-VALUES = ("intensity", "classification", "gps_time", "range", "target")
+from clouds import COLORS, Cloud, write_plain_ply
+from compare import Kept, same, within
 
 
 def convert(source, target, *options) -> None:
@@ -32,8 +30,9 @@ def write(cloud: Cloud, path) -> None:
 
 
 HOLES = {"holes": "it puts them at 0 0 0"}
-# Normals are one of two million directions.
+# Normals are two million directions.
 NORMALS = within(2e-3)
+ROUNDS = "holds a normal in 21 bits"
 
 CASES = [
     Case(
@@ -42,9 +41,10 @@ CASES = [
         extension=".ply",
         read=read,
         write=write,
-        reads=Kept(points=within(1e-5), normals=NORMALS, values=same((*COLORS, "intensity")), remark="rounds normals"),
-        writes=Kept(points=within(1e-5), normals=NORMALS, values=same((*COLORS, "intensity"))),
+        reads=Kept(points=within(1e-5), normals=NORMALS, values=same((*COLORS, "intensity")), remark=ROUNDS),
+        writes=Kept(points=within(1e-5), normals=NORMALS, values=same((*COLORS, "intensity")), remark=ROUNDS),
         made=Kept(values=same((*COLORS, "intensity"))),
+        called={"intensity": "scalar_intensity"},
         without=HOLES,
     ),
     Case(
@@ -53,7 +53,17 @@ CASES = [
         extension=".xyz",
         read=read,
         made=TEXT,
+        only=(),
         without=HOLES,
-        reads=Kept(points=within(1e-5), normals=NORMALS, remark="rounds normals"),
+        reads=Kept(points=within(1e-5), normals=NORMALS, remark=ROUNDS),
+    ),
+    Case(
+        program="CloudCompare",
+        format="OBJ",
+        extension=".obj",
+        read=read,
+        made=Kept(leaves_out_holes=True),
+        reads=Kept(points=within(1e-5), normals=NORMALS, remark=ROUNDS),
+        only=(),
     ),
 ]

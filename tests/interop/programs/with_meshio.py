@@ -4,11 +4,11 @@ import meshio
 import numpy as np
 
 from case import Case
-from clouds import CLOUDS, COLORS, Cloud
+from clouds import COLORS, NAMES, Cloud
 from compare import Kept, same
 
 # meshio fails on `ushort`, so its clouds have no intensity, and it takes `uchar` for signed.
-GIVEN = tuple(name for name in CLOUDS["local"].values if name != "intensity")
+GIVEN = tuple(name for name in NAMES if name != "intensity")
 READ = tuple(name for name in GIVEN if name not in COLORS)
 
 
@@ -18,6 +18,12 @@ def read(path) -> Cloud:
     columns = dict(mesh.point_data)
     normals = np.column_stack([columns.pop(name) for name in ("nx", "ny", "nz")])
     return Cloud(np.asarray(mesh.points, np.float64), normals, columns)
+
+
+def read_obj(path) -> Cloud:
+    """Reads positions and normals."""
+    mesh = meshio.read(path)
+    return Cloud(np.asarray(mesh.points)[:, :3], mesh.point_data.get("obj:vn"))
 
 
 def write(cloud: Cloud, path) -> None:
@@ -38,5 +44,14 @@ CASES = [
         writes=Kept(values=same(GIVEN)),
         made=Kept(values=same(GIVEN)),
         only=GIVEN,
+    ),
+    Case(
+        program="meshio",
+        format="OBJ",
+        extension=".obj",
+        read=read_obj,
+        made=Kept(leaves_out_holes=True),
+        reads=Kept(remark="takes colors for coordinates, so without"),
+        only=(),
     ),
 ]

@@ -3,17 +3,17 @@
 import numpy as np
 
 from case import TEXT, Case
-from clouds import CLOUDS, Cloud
+from clouds import NAMES, Cloud
 from compare import Kept, same
 
-NAMES = ("x", "y", "z", "nx", "ny", "nz", *CLOUDS["local"].values)
-ALL = same(CLOUDS["local"].values)
+COLUMNS = ("x", "y", "z", "nx", "ny", "nz", *NAMES)
+ALL = same(NAMES)
 
 
 def write(cloud: Cloud, path, delimiter=" ", comments="") -> None:
     """Writes a line of names and a line for each point, with all digits."""
     rows = np.column_stack([cloud.positions, cloud.normals.astype(np.float64), *cloud.values.values()])
-    np.savetxt(path, rows, fmt="%.17g", delimiter=delimiter, header=delimiter.join(NAMES), comments=comments)
+    np.savetxt(path, rows, fmt="%.17g", delimiter=delimiter, header=delimiter.join(COLUMNS), comments=comments)
 
 
 def read(path, delimiter=None) -> Cloud:
@@ -36,7 +36,7 @@ def read_bare(path) -> Cloud:
 
 
 CASES = [
-    Case(program="numpy", format="text, x y z nx ny nz", extension=".xyz", read=read_bare, write=write_bare, made=TEXT),
+    Case(program="numpy", format="text, x y z nx ny nz", extension=".xyz", read=read_bare, write=write_bare, made=TEXT, only=()),
     Case(
         program="numpy",
         format="CSV",

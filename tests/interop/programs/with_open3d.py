@@ -54,7 +54,7 @@ ATTRIBUTES = same((*COLORS, "classification", "gps_time", "range", "target"))
 
 CASES = [
     Case(
-        program="open3d",
+        program="Open3D",
         format="PLY, little-endian",
         extension=".ply",
         read=read,
@@ -64,12 +64,13 @@ CASES = [
         made=Kept(values=ATTRIBUTES),
     ),
     Case(
-        program="open3d",
+        program="Open3D",
         format="text, x y z nx ny nz",
         extension=".xyz",
         read=read_text,
         write=write_text,
         made=TEXT,
+        only=(),
         writes=Kept(points=within(1e-10), normals=within(1e-7), remark="writes ten digits after the point"),
     ),
 ]

@@ -4,10 +4,10 @@ import numpy as np
 from plyfile import PlyData, PlyElement
 
 from case import Case, read_ply
-from clouds import CLOUDS, Cloud, write_plain_ply
+from clouds import NAMES, Cloud, write_plain_ply
 from compare import Kept, same
 
-ALL = same(CLOUDS["local"].values)
+ALL = same(NAMES)
 
 
 def write(cloud: Cloud, path, text=False, byte_order="<") -> None:

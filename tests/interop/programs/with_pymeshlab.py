@@ -28,6 +28,9 @@ def write(cloud: Cloud, path) -> None:
 
 HOLES = {"holes": "it gives places and normals of different rows"}
 
+# As shares of 1, with six digits.
+COLORS_OF_OBJ = same(COLORS)
+
 CASES = [
     Case(
         program="pymeshlab",
@@ -48,6 +51,18 @@ CASES = [
         write=write,
         writes=Kept(points=within(1e-6), normals=within(1e-6), remark="writes six digits after the point"),
         made=TEXT,
+        only=(),
+        without=HOLES,
+    ),
+    Case(
+        program="pymeshlab",
+        format="OBJ",
+        extension=".obj",
+        read=read,
+        write=write,
+        reads=Kept(normals=None, values=COLORS_OF_OBJ, remark="gives no normals to vertices without faces"),
+        writes=Kept(values=COLORS_OF_OBJ),
+        made=Kept(values=COLORS_OF_OBJ, leaves_out_holes=True),
         without=HOLES,
     ),
 ]

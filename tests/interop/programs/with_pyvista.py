@@ -15,13 +15,23 @@ def read(path) -> Cloud:
     return Cloud(np.asarray(mesh.points, np.float64), np.asarray(mesh.point_data["Normals"]), colors)
 
 
+REMARK = "VTK's readers give coordinates as float"
+
 CASES = [
     Case(
-        program="pyvista",
+        program="PyVista",
         format="PLY, little-endian",
         extension=".ply",
         read=read,
-        reads=Kept(points=FLOAT, values=same(COLORS), remark="coordinates are float in VTK's reader"),
+        reads=Kept(points=FLOAT, values=same(COLORS), remark=REMARK),
         made=Kept(values=same(COLORS)),
+    ),
+    Case(
+        program="PyVista",
+        format="OBJ",
+        extension=".obj",
+        read=read,
+        reads=Kept(points=FLOAT, values=same(COLORS), remark=REMARK),
+        made=Kept(values=same(COLORS), leaves_out_holes=True),
     ),
 ]
