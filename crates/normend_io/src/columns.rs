@@ -13,7 +13,7 @@ use crate::table::{COORDINATES, Layout, N_VALUES, PART_ROWS};
 use crate::value::Scalar;
 
 /// Names of columns that hold red, green and blue, in lower case.
-const COLOR_NAMES: [[&str; 3]; 4] = [
+pub(crate) const COLOR_NAMES: [[&str; 3]; 4] = [
     ["red", "green", "blue"],
     ["r", "g", "b"],
     ["diffuse_red", "diffuse_green", "diffuse_blue"],
@@ -58,6 +58,32 @@ pub(crate) fn slots_for(coordinates: &[Option<usize>], columns: &[usize]) -> ([O
         })
         .collect();
     (slots, found)
+}
+
+/// Which of some names are those of red, green and blue, in any case of letters.
+pub(crate) fn colors_among<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Option<[usize; 3]> {
+    let find = |wanted: &str| names.clone().position(|name| name.eq_ignore_ascii_case(wanted));
+    COLOR_NAMES.iter().find_map(|wanted| {
+        let [red, green, blue] = wanted.map(find);
+        Some([red?, green?, blue?])
+    })
+}
+
+/// What a channel of a color has at most, from whether it `is_byte` and from the largest value that there is.
+pub(crate) fn white(is_byte: bool, largest: f64) -> f64 {
+    match largest {
+        _ if is_byte => 255.0,
+        // Some programs go a little beyond 1.
+        ..=1.001 => 1.0,
+        ..=255.0 => 255.0,
+        _ => 65535.0,
+    }
+}
+
+/// A channel of a color in 8 bits. What is not finite is black.
+pub(crate) fn color_byte(value: f64, white: f64) -> u8 {
+    // A cast of NaN is 0.
+    (value / white * 255.0).round().clamp(0.0, 255.0) as u8
 }
 
 impl Scan {
@@ -106,19 +132,11 @@ impl Scan {
         let are_bytes = (self.columns().iter())
             .filter(|column| columns.contains(&column.index))
             .all(is_byte);
-        let white = match largest {
-            _ if are_bytes => 255.0,
-            // Some programs go a little beyond 1.
-            ..=1.001 => 1.0,
-            ..=255.0 => 255.0,
-            _ => 65535.0,
-        };
+        let white = white(are_bytes, largest);
         let [red, green, blue] = &channels;
-        // What is not finite is black: a cast of NaN is 0.
-        let byte = |value: f64| (value / white * 255.0).round().clamp(0.0, 255.0) as u8;
         let colors = (red, green, blue)
             .into_par_iter()
-            .map(|(&red, &green, &blue)| [byte(red), byte(green), byte(blue)])
+            .map(|(&red, &green, &blue)| [red, green, blue].map(|value| color_byte(value, white)))
             .collect();
         Ok(Some(colors))
     }
@@ -132,14 +150,8 @@ impl Scan {
 
     fn color_columns(&self) -> Option<[usize; 3]> {
         let columns = self.columns();
-        let find = |wanted: &str| {
-            let named = |column: &&Column| column.name.eq_ignore_ascii_case(wanted);
-            columns.iter().find(named).map(|column| column.index)
-        };
-        let by_name = COLOR_NAMES.iter().find_map(|names| {
-            let [red, green, blue] = names.map(find);
-            Some([red?, green?, blue?])
-        });
+        let by_name = colors_among(columns.iter().map(|column| column.name.as_str()));
+        let by_name = by_name.map(|found| found.map(|index| columns[index].index));
         by_name.or_else(|| self.file.layout.unnamed_colors(&self.file.bytes))
     }
 

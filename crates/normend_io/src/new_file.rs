@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use normend_core::Progress;
 use rayon::prelude::*;
 
-use crate::columns::{Column, ColumnKind};
+use crate::columns::{Column, ColumnKind, color_byte, white};
 use crate::error::{Broken, Stop, WriteError, quoted};
 use crate::output::Output;
 use crate::rewrite::{NO_NORMAL, RowNormals};
@@ -94,6 +94,17 @@ pub(crate) struct NewRow<'a> {
 }
 
 impl NewRow<'_> {
+    /// Appends the coordinates as little-endian numbers of a type that holds them.
+    pub fn push_binary_coordinates(&self, scalar: Scalar, out: &mut Vec<u8>) {
+        match &self.coordinates {
+            Some(cells) => cells.iter().for_each(|cell| cell.push_binary(scalar, out)),
+            None => {
+                let values = self.position.to_array();
+                values.iter().for_each(|&value| push_scalar(value, scalar, out));
+            }
+        }
+    }
+
     /// Appends the coordinates as text, as they are or as short as they read back, with `separator` between them.
     pub fn push_coordinates(&self, coordinates: Scalar, separator: u8, out: &mut Vec<u8>) {
         for axis in 0..3 {
@@ -237,8 +248,58 @@ impl<'a> NewFile<'a> {
         Ok(())
     }
 
+    /// What white is in three fields of colors, and whether 8 bits a channel hold them. Goes over all rows once where their type
+    /// does not tell.
+    pub fn color_scale(&self, colors: [usize; 3], progress: &dyn Progress) -> Result<ColorScale, Stop> {
+        if colors.iter().all(|&field| self.fields[field].kind == ColumnKind::Number(Scalar::UChar)) {
+            return Ok(ColorScale {
+                white: 255.0,
+                is_exact: true,
+            });
+        }
+        // Of the channels: the largest, and whether bytes hold them if white is 1, 255 or 65535.
+        type Seen = (f64, [bool; 3]);
+        const WHITES: [f64; 3] = [1.0, 255.0, 65535.0];
+        let is_byte = |value: f64, white: f64| {
+            let byte = f64::from(color_byte(value, white));
+            // Programs that write shares of 1 write at least five digits of them.
+            (value / white * 255.0 - byte).abs() < 3e-3
+        };
+        let n_parts = self.n_rows.div_ceil(PART_ROWS);
+        let seen: Vec<Result<Seen, Stop>> = (0..n_parts)
+            .into_par_iter()
+            .map(|index| {
+                progress.report(index as f32 / n_parts as f32)?;
+                let mut seen: Seen = (0.0, [true; 3]);
+                self.for_rows(self.rows_of_part(index), |row| {
+                    for field in colors {
+                        let value = row.cells[field].number();
+                        if value.is_finite() {
+                            seen.0 = seen.0.max(value);
+                        }
+                        for (are_bytes, white) in seen.1.iter_mut().zip(WHITES) {
+                            *are_bytes = *are_bytes && is_byte(value, white);
+                        }
+                    }
+                })?;
+                Ok(seen)
+            })
+            .collect();
+        let mut all: Seen = (0.0, [true; 3]);
+        for part in seen {
+            let (largest, are_bytes) = part?;
+            all.0 = all.0.max(largest);
+            for (all, are_bytes) in all.1.iter_mut().zip(are_bytes) {
+                *all &= are_bytes;
+            }
+        }
+        let white = white(false, all.0);
+        let is_exact = WHITES.iter().zip(all.1).any(|(&other, are_bytes)| other == white && are_bytes);
+        Ok(ColorScale { white, is_exact })
+    }
+
     /// The rows of a part, the unit of parallel work.
-    fn rows_of_part(&self, index: usize) -> Range<usize> {
+    pub fn rows_of_part(&self, index: usize) -> Range<usize> {
         index * PART_ROWS..((index + 1) * PART_ROWS).min(self.n_rows)
     }
 
@@ -352,6 +413,14 @@ impl<'a> NewFile<'a> {
             }
         }
     }
+}
+
+/// How colors are measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ColorScale {
+    pub white: f64,
+    /// Whether they are multiples of a 255th of it.
+    pub is_exact: bool,
 }
 
 /// What some decimals have in common.

@@ -45,6 +45,12 @@ pub(crate) enum ValueType {
     },
     /// A little-endian number of steps that stands for another number, which is only read.
     Scaled(Scalar, Scale),
+    /// The byte from bit `shift` on of a number of 32 bits in text, as PCD has colors: a whole number that is only read.
+    TextByte {
+        shift: u8,
+        /// Whether the number is said to be a `float`, whose bits are meant then.
+        is_float: bool,
+    },
 }
 
 /// What number of steps stands for what: `(steps + shift) * multiplier / divisor + offset`.
@@ -121,7 +127,7 @@ impl ValueType {
         match self {
             Self::Text => None,
             Self::LittleEndian(scalar) | Self::BigEndian(scalar) => Some(scalar),
-            Self::Bits { .. } => Some(Scalar::UChar),
+            Self::Bits { .. } | Self::TextByte { .. } => Some(Scalar::UChar),
             Self::Scaled(..) => Some(Scalar::Double),
         }
     }
@@ -130,6 +136,7 @@ impl ValueType {
     pub fn size(self) -> usize {
         match self {
             Self::Scaled(steps, _) => steps.size(),
+            Self::TextByte { .. } => 0,
             _ => self.scalar().map_or(0, Scalar::size),
         }
     }
@@ -159,6 +166,7 @@ impl ValueType {
                 f64::from((byte >> first) & (0xff >> (8 - n_bits)))
             }
             Self::Scaled(steps, scale) => scale.value(from_bytes!(steps, from_le_bytes, bytes)),
+            Self::TextByte { shift, is_float } => f64::from((bits_of_text(bytes, is_float)? >> shift) as u8),
         })
     }
 
@@ -173,6 +181,7 @@ impl ValueType {
             Self::LittleEndian(_) => out.extend_from_slice(&value.to_le_bytes()),
             Self::BigEndian(_) => out.extend_from_slice(&value.to_be_bytes()),
             Self::Bits { .. } => out.push(value as u8),
+            Self::TextByte { .. } => push_number(f64::from(value), true, out),
             Self::Scaled(steps, scale) => push_scalar(scale.steps(f64::from(value)), steps, out),
         }
     }
@@ -218,11 +227,24 @@ impl ValueType {
                     *byte ^= 0x80;
                 }
             }
-            Self::Bits { .. } | Self::Scaled(..) => {
+            Self::Bits { .. } | Self::Scaled(..) | Self::TextByte { .. } => {
                 self.write(-self.read(bytes).unwrap_or(0.0) as f32, out);
             }
         }
     }
+}
+
+/// The 32 bits that a number in text stands for. A `float` means its own bits; but colors without opacity are floats next to
+/// nothing then, so a program that writes a whole number means that.
+fn bits_of_text(token: &[u8], is_float: bool) -> Option<u32> {
+    let value = parse(token)?;
+    let is_whole = value.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&value);
+    Some(if is_float && !is_whole {
+        (value as f32).to_bits()
+    } else {
+        // A negative one is the same bits, signed.
+        value as i64 as u32
+    })
 }
 
 /// Appends the number of a type that is nearest to `value`, little-endian; 0 for what is no number in a type of whole ones.

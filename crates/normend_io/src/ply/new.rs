@@ -22,19 +22,7 @@ pub(crate) fn write(file: &mut NewFile<'_>, out: &mut Output<'_>, progress: &dyn
     out.write(header(file, &scalars).as_bytes())?;
     file.write_rows(
         |row, out| {
-            match (&row.coordinates, file.coordinates) {
-                (Some(cells), scalar) => cells.iter().for_each(|cell| cell.push_binary(scalar, out)),
-                (None, Scalar::Double) => row
-                    .position
-                    .to_array()
-                    .iter()
-                    .for_each(|value| out.extend(value.to_le_bytes())),
-                (None, _) => row
-                    .position
-                    .to_array()
-                    .iter()
-                    .for_each(|value| out.extend((*value as f32).to_le_bytes())),
-            }
+            row.push_binary_coordinates(file.coordinates, out);
             for component in row.normal.iter().flat_map(glam::Vec3::to_array) {
                 ValueType::LittleEndian(Scalar::Float).write(component, out);
             }
