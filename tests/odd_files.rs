@@ -430,7 +430,7 @@ fn from_one_format_to_another() {
     let normals = [Vec3::X, Vec3::NEG_Z];
     assert_eq!(
         written(&scan, &normals, "out.TXT"),
-        b"1.500 2 3 1 0 0\n-4e1 5 6 0 0 -1\n"
+        b"# x y z nx ny nz red\n1.500 2 3 1 0 0 255\n-4e1 5 6 0 0 -1 0\n"
     );
     // A name without an extension does not change the format.
     assert!(written(&scan, &normals, "out").starts_with(b"ply\nformat ascii"));

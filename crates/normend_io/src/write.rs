@@ -52,7 +52,7 @@ impl Scan {
     pub fn losses(&self, path: &Path) -> Result<Vec<Loss>, WriteError> {
         let format = FileFormat::of_target(path, self.path().map(PathBuf::as_path))?.unwrap_or(self.format);
         if format == self.format {
-            return Ok(Vec::new());
+            return Ok(self.file.layout.remarks());
         }
         let mut file = NewFile::of_file(self.file.layout.as_ref(), &self.file.bytes, None);
         let besides = self.file.layout.besides_rows(&self.file.bytes);
@@ -60,7 +60,11 @@ impl Scan {
             .into_iter()
             .map(|what| Loss {
                 what,
-                why: format!("{} from {} holds points only", format.label(), self.format.label()),
+                why: format!(
+                    "{} made from {} holds points alone",
+                    format.label(),
+                    self.format.label()
+                ),
             })
             .collect();
         losses.extend(format.limit(&mut file, path));
@@ -128,9 +132,17 @@ impl Scan {
         progress.stage("Writing");
         let format = FileFormat::of_target(path, self.path().map(PathBuf::as_path))?.unwrap_or(self.format);
         if format == self.format {
-            return Err(WriteError::Target {
+            let copied = || WriteError::Target {
                 path: path.to_owned(),
                 reason: "would be of the format that came in: copy the file",
+            };
+            if path.extension() == self.path().and_then(|input| input.extension()) {
+                return Err(copied());
+            }
+            // A format may have two forms, one of them packed.
+            return self.place(path, options, |out| {
+                let file = &self.file;
+                file.layout.copy(&file.bytes, out, progress).unwrap_or_else(|| Err(copied()))
             });
         }
         let rows = self.rows.as_ref().map(|rows| rows.as_slice());

@@ -248,7 +248,10 @@ impl Layout for PlyLayout {
         let elements = self.header.elements.iter().enumerate();
         let others = elements.filter(|(index, element)| *index != self.vertex && element.count > 0);
         let mut besides: Vec<String> = others
-            .map(|(_, element)| format!("{} rows of element \"{}\"", element.count, element.name))
+            .map(|(_, element)| {
+                let rows = if element.count == 1 { "row" } else { "rows" };
+                format!("{} {rows} of element \"{}\"", element.count, element.name)
+            })
             .collect();
         let properties = &self.header.elements[self.vertex].properties;
         let lists = properties
