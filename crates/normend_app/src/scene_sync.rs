@@ -40,6 +40,13 @@ pub enum Target {
 }
 
 impl Target {
+    /// The id of the point, or of the source's point.
+    pub fn point(self) -> u32 {
+        match self {
+            Self::Point { point, .. } | Self::Source { point, .. } => point,
+        }
+    }
+
     /// Where it is seen, in world space.
     pub fn position(self) -> Vec3 {
         match self {

@@ -360,6 +360,27 @@ pub fn thousands(number: u64) -> String {
     text
 }
 
+/// A coordinate with all of its digits and no more: those of an `f32` where it is one.
+pub fn coordinate(value: f64) -> String {
+    let single = value as f32;
+    let is_plain = value == 0.0 || (1e-6..1e16).contains(&value.abs());
+    match (f64::from(single) == value, is_plain) {
+        (true, true) => single.to_string(),
+        (false, true) => value.to_string(),
+        (true, false) => format!("{single:e}"),
+        (false, false) => format!("{value:e}"),
+    }
+}
+
+/// Decimals that tell lengths apart by a ten-millionth of `whole`, which is as fine as pictures are; for fields of any unit.
+pub fn decimals(whole: f64) -> usize {
+    if whole > 0.0 {
+        (7.0 - whole.log10().floor()).clamp(0.0, 24.0) as usize
+    } else {
+        6
+    }
+}
+
 /// "1 point", "2,000 points".
 pub fn counted(number: u64, singular: &str, plural: &str) -> String {
     format!("{} {}", thousands(number), if number == 1 { singular } else { plural })

@@ -121,7 +121,9 @@ impl App {
                 .scene
                 .as_ref()
                 .and_then(|scene| self.point_tool.target_at(scene, pixel));
-            action = context_menu::ui(ui, pixel, target, &|command| self.availability(command));
+            let place = (self.session.as_ref().zip(target.flatten()))
+                .and_then(|(session, target)| session.scan.coordinates(target.point()));
+            action = context_menu::ui(ui, pixel, target, place, &|command| self.availability(command));
         });
         if shown.is_none() {
             self.menu_pixel = None;

@@ -229,7 +229,8 @@ fn written() -> String {
 /// What to say of a drive that does not answer any more.
 const DRIVE_IS_GONE: &str = "its drive does not answer: connect it again and try once more";
 
-fn io_words(error: &io::Error) -> String {
+/// What the system says of a file, in words and with what to do; every message that names such an error takes it from here.
+pub fn io_words(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "there is no such file or folder: check the path".to_owned(),
         io::ErrorKind::PermissionDenied => "the system forbids it: check the permissions".to_owned(),
@@ -251,7 +252,12 @@ fn io_words(error: &io::Error) -> String {
         // EIO, ENXIO and ENODEV, of a drive that was pulled out; these are their numbers on Linux, macOS and the BSDs.
         _ if cfg!(unix) && matches!(error.raw_os_error(), Some(5 | 6 | 19)) => DRIVE_IS_GONE.to_owned(),
         io::ErrorKind::OutOfMemory => "it does not fit into memory: split the scan".to_owned(),
-        _ => error.to_string(),
+        _ => {
+            let words = error.to_string();
+            // The number is for programs.
+            let end = words.find(" (os error ").unwrap_or(words.len());
+            words[..end].to_owned()
+        }
     }
 }
 

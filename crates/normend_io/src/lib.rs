@@ -45,7 +45,7 @@ pub mod recipe;
 #[cfg(test)]
 mod confidence_tests;
 
-pub use error::{Broken, Place, ReadError, WriteError};
+pub use error::{Broken, Place, ReadError, WriteError, io_words};
 pub use format::FileFormat;
 pub use new_file::Loss;
 pub use save::{is_same_file, n_other_names};

@@ -6,7 +6,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use normend_core::evidence::Station;
 use normend_core::progress::Part;
 use normend_core::{PointCloud, Progress};
@@ -15,7 +15,7 @@ use crate::error::{ReadError, Stop};
 use crate::format::{FileFormat, recognize};
 use crate::on_disk::{Content, OnDisk};
 use crate::recipe::ScanIdentity;
-use crate::table::{Layout, read_points};
+use crate::table::{Layout, read_place, read_points};
 use crate::{ply, xyz};
 
 /// A scan as it was read: the points, and the file itself so that it can be written again with other normals.
@@ -163,6 +163,15 @@ impl Scan {
     /// Where it was read from; `None` for [`read_bytes`].
     pub fn path(&self) -> Option<&PathBuf> {
         self.file.path.as_ref()
+    }
+
+    /// Where `point` is, with all digits that the file has; `None` past the last point. Reads up to some thousand rows.
+    pub fn coordinates(&self, point: u32) -> Option<DVec3> {
+        let row = match &self.rows {
+            Some(rows) => *rows.get(point as usize)?,
+            None => point,
+        };
+        read_place(&*self.file.layout, &self.file.bytes, row as usize)
     }
 
     /// Whether another program has changed the file since it was read, or since it was written over. One look at the disk, not into

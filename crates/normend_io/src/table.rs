@@ -4,7 +4,7 @@
 //! parallel, the same for all formats.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use normend_core::{Cancelled, PointCloud, PointCloudError, Progress};
@@ -409,16 +409,19 @@ pub(crate) fn read_points(layout: &dyn Layout, bytes: &[u8], progress: &dyn Prog
         rows_left = rest;
         parts.push((index, part_positions, part_normals, part_rows));
     }
+    let is_rounded = AtomicBool::new(false);
     let results: Vec<Result<(), Stop>> = parts
         .into_par_iter()
         .map(|(index, positions, normals, rows)| {
             report()?;
             let mut point = 0;
+            let mut lacks = false;
             read_part(layout, bytes, table.part(index), |row, position, normal| {
                 if !position.is_finite() {
                     return;
                 }
                 positions[point] = (position - origin).as_vec3();
+                lacks |= positions[point].as_dvec3() != position - origin;
                 if let Some(slot) = normals.get_mut(point) {
                     *slot = if normal.is_finite() { normal } else { Vec3::ZERO };
                 }
@@ -427,15 +430,73 @@ pub(crate) fn read_points(layout: &dyn Layout, bytes: &[u8], progress: &dyn Prog
                     *slot = row as u32;
                 }
                 point += 1;
+            })?;
+            if lacks {
+                is_rounded.store(true, Ordering::Relaxed);
+            }
+            Ok(())
+        })
+        .collect();
+    results.into_iter().collect::<Result<(), Stop>>()?;
+    let mut cloud = PointCloud::new(origin, positions).map_err(unfit)?;
+    if is_rounded.into_inner() && cloud.is_coarse() {
+        let n_finite = summaries.iter().map(|summary| summary.n_finite);
+        let remainders = read_remainders(layout, bytes, &cloud, n_finite, progress)?;
+        cloud = cloud.with_remainders(remainders);
+    }
+    Ok(Points {
+        cloud,
+        normals: table.has_normals.then_some(normals),
+        rows: has_rows.then_some(rows),
+    })
+}
+
+/// The coordinates of one row, in the scan's; `None` where they cannot be read. O([`PART_ROWS`]) at most.
+pub(crate) fn read_place(layout: &dyn Layout, bytes: &[u8], row: usize) -> Option<DVec3> {
+    let table = layout.table();
+    if row >= table.n_rows {
+        return None;
+    }
+    let mut part = table.part(row / PART_ROWS);
+    part.n_rows = row - part.first_row + 1;
+    let mut place = None;
+    let read = read_part(layout, bytes, part, |_, position, _| place = Some(position));
+    read.ok().and(place)
+}
+
+/// Reads the coordinates once more for what `f32` rounds away of them; `n_finite` are the points of each part.
+fn read_remainders(
+    layout: &dyn Layout,
+    bytes: &[u8],
+    cloud: &PointCloud,
+    n_finite: impl Iterator<Item = usize>,
+    progress: &dyn Progress,
+) -> Result<Vec<[i8; 3]>, Stop> {
+    let mut remainders = vec![[0; 3]; cloud.n_points()];
+    let mut parts = Vec::new();
+    let (mut left, mut first) = (&mut remainders[..], 0);
+    for (index, n_finite) in n_finite.enumerate() {
+        let (part, rest) = left.split_at_mut(n_finite);
+        parts.push((index, first, part));
+        left = rest;
+        first += n_finite;
+    }
+    let results: Vec<Result<(), Stop>> = parts
+        .into_par_iter()
+        .map(|(index, first, remainders)| {
+            progress.report(1.0)?;
+            let mut points = remainders.iter_mut().zip(first..);
+            read_part(layout, bytes, layout.table().part(index), |_, position, _| {
+                if position.is_finite()
+                    && let Some((remainder, point)) = points.next()
+                {
+                    *remainder = cloud.remainder(point, position);
+                }
             })
         })
         .collect();
     results.into_iter().collect::<Result<(), Stop>>()?;
-    Ok(Points {
-        cloud: PointCloud::new(origin, positions).map_err(unfit)?,
-        normals: table.has_normals.then_some(normals),
-        rows: has_rows.then_some(rows),
-    })
+    Ok(remainders)
 }
 
 /// Hands row, position and normal (zero where there is none) of each row of a part to `take`, in the scan's coordinates.

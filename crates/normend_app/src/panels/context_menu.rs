@@ -1,10 +1,12 @@
 //! The menu of a right click in the view: what can be done with what is under the pointer, then with the selection.
 
 use egui::{Button, RichText, Ui};
+use glam::DVec3;
 
 use super::Availability;
 use crate::command::{Action, Command};
 use crate::scene_sync::Target;
+use crate::theme;
 use crate::tools::point_tool::Means;
 use crate::viewport::Pixel;
 
@@ -22,11 +24,12 @@ const OF_SELECTION: [Command; 7] = [
     Command::HideSelected,
 ];
 
-/// The content of the menu. `target` is what is at `pixel`; `None` while that is not known.
+/// The content of the menu. `target` is what is at `pixel`; `None` while that is not known. `place` is where its point is in the file.
 pub fn ui(
     ui: &mut Ui,
     pixel: Pixel,
     target: Option<Option<Target>>,
+    place: Option<DVec3>,
     availability: &Availability<'_>,
 ) -> Option<Action> {
     ui.set_min_width(WIDTH);
@@ -49,6 +52,17 @@ pub fn ui(
             ui.label(RichText::new("No point is here").weak());
         }
         Some(Some(target)) => {
+            if let Some(place) = place {
+                let text = place.to_array().map(theme::coordinate).join(", ");
+                let tooltip = format!(
+                    "Where this point is in the file: click to copy. Point {}",
+                    target.point()
+                );
+                if ui.button(RichText::new(&text).weak()).on_hover_text(tooltip).clicked() {
+                    ui.ctx().copy_text(text);
+                }
+                ui.separator();
+            }
             if let Target::Source { point, .. } = target {
                 let select = Action::SelectSource { point, extend: false };
                 item(

@@ -139,11 +139,13 @@ fn select_fields(ui: &mut Ui, histogram: &Histogram, scale: &Scale<'_>) -> Optio
     let id = ui.scope_id().with(("values to select", scale.name));
     let mut range: [f64; 2] = ui.data(|data| data.get_temp(id)).unwrap_or(histogram.range);
     let speed = (histogram.range[1] - histogram.range[0]).abs().max(f64::MIN_POSITIVE) / 200.0;
+    // Ten thousandths of the range tell any two bars apart.
+    let decimals = theme::decimals((histogram.range[1] - histogram.range[0]).abs()).saturating_sub(3);
     let mut action = None;
     ui.horizontal(|ui| {
         for (end, name) in range.iter_mut().zip(["from", "to"]) {
             let label = ui.label(RichText::new(name).weak());
-            let field = ui.add(DragValue::new(end).speed(speed).max_decimals(3));
+            let field = ui.add(DragValue::new(end).speed(speed).max_decimals(decimals));
             field.labelled_by(label.id);
         }
         let button = ui.button("Select");

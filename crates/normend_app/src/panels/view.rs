@@ -326,6 +326,7 @@ fn marks(ui: &mut Ui, settings: &mut DisplaySettings) {
 fn box_fields(ui: &mut Ui, cloud: &PointCloud, low: &mut Vec3, high: &mut Vec3) {
     let origin = cloud.origin();
     let speed = f64::from(cloud.diagonal()) / 500.0;
+    let decimals = theme::decimals(cloud.diagonal().into());
     theme::rows(ui, "clip box", |ui| {
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             ui.label(RichText::new(format!("{name} from, to")).weak());
@@ -334,7 +335,7 @@ fn box_fields(ui: &mut Ui, cloud: &PointCloud, low: &mut Vec3, high: &mut Vec3) 
                 let mut ends = [low[axis], high[axis]].map(|value| f64::from(value) + origin[axis]);
                 let mut changed = false;
                 for (end, which) in ends.iter_mut().zip(["from", "to"]) {
-                    let field = ui.add(DragValue::new(end).speed(speed).max_decimals(4));
+                    let field = ui.add(DragValue::new(end).speed(speed).max_decimals(decimals));
                     field.widget_info(|| {
                         egui::WidgetInfo::labeled(
                             egui::accesskit::Role::SpinButton,

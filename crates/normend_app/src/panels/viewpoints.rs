@@ -72,6 +72,7 @@ fn list(ui: &mut Ui, session: &mut Session) -> Option<Action> {
     });
     let origin = document.cloud().origin();
     let speed = SPEED * f64::from(document.cloud().diagonal());
+    let decimals = theme::decimals(document.cloud().diagonal().into());
     let mut moved = None;
     for (index, place) in places.into_iter().enumerate() {
         ui.horizontal(|ui| {
@@ -88,7 +89,7 @@ fn list(ui: &mut Ui, session: &mut Session) -> Option<Action> {
             for (value, axis) in values.iter_mut().zip(["x", "y", "z"]) {
                 let field = DragValue::new(value)
                     .speed(speed)
-                    .max_decimals(4)
+                    .max_decimals(decimals)
                     .update_while_editing(false);
                 let response = ui.add_sized(Vec2::new(width, ui.spacing().interact_size.y), field);
                 let response = response.accessible_name(format!("Viewpoint {}, {axis}", index + 1));
