@@ -17,8 +17,19 @@ use crate::INTERRUPTED;
 const BAR_STEPS: f32 = 1000.0;
 
 /// Writes a line to standard error. A closed standard error is no reason to stop, so failures are left alone.
+///
+/// Names in files and of files may hold anything, so control characters are written as what they are called: they would be
+/// commands to a terminal.
 pub fn say(line: &str) {
-    let _ = writeln!(io::stderr().lock(), "{line}");
+    let mut shown = String::with_capacity(line.len());
+    for letter in line.chars() {
+        if letter.is_control() && letter != '\n' {
+            shown.extend(letter.escape_default());
+        } else {
+            shown.push(letter);
+        }
+    }
+    let _ = writeln!(io::stderr().lock(), "{shown}");
 }
 
 /// Set when the user asked to stop.

@@ -154,9 +154,31 @@ impl Broken {
     pub(crate) fn new(place: Place, reason: impl Into<String>) -> Self {
         Self {
             place,
-            reason: reason.into(),
+            reason: printable(reason.into()),
         }
     }
+}
+
+/// A sentence that a terminal can be given: names in files may be anything, commands to the terminal and whole books among it.
+/// The end says what to do, so what is too long loses its middle.
+fn printable(sentence: String) -> String {
+    /// Characters that are kept of the beginning and of the end; sentences of Normend's own words are shorter.
+    const MOST: [usize; 2] = [240, 160];
+    if !sentence.contains(char::is_control) && sentence.len() <= MOST[0] + MOST[1] {
+        return sentence;
+    }
+    let mut letters: Vec<char> = Vec::new();
+    for letter in sentence.chars() {
+        if letter.is_control() {
+            letters.extend(letter.escape_default());
+        } else {
+            letters.push(letter);
+        }
+    }
+    if letters.len() > MOST[0] + MOST[1] {
+        letters.splice(MOST[0]..letters.len() - MOST[1], ['…']);
+    }
+    letters.into_iter().collect()
 }
 
 impl fmt::Display for Broken {

@@ -59,7 +59,16 @@ impl Cell<'_> {
     /// Appends it as text: a text's as it is, a number as short as it reads back.
     pub fn push_text(&self, out: &mut Vec<u8>) {
         match self.value_type {
-            ValueType::Text => out.extend_from_slice(self.bytes),
+            ValueType::Text if self.bytes.is_empty() => out.extend_from_slice(b"nan"),
+            ValueType::Text => {
+                // What separates values in this text may stand within one in another.
+                let is_separator = |byte: u8| matches!(byte, b',' | b';') || byte.is_ascii_control();
+                out.extend(
+                    self.bytes
+                        .iter()
+                        .map(|&byte| if is_separator(byte) { b'_' } else { byte }),
+                );
+            }
             binary => match binary.read_long(self.bytes) {
                 Some(long) => out.extend_from_slice(long.to_string().as_bytes()),
                 None => push_number(self.number(), binary.scalar() == Some(Scalar::Float), out),
@@ -251,7 +260,10 @@ impl<'a> NewFile<'a> {
     /// What white is in three fields of colors, and whether 8 bits a channel hold them. Goes over all rows once where their type
     /// does not tell.
     pub fn color_scale(&self, colors: [usize; 3], progress: &dyn Progress) -> Result<ColorScale, Stop> {
-        if colors.iter().all(|&field| self.fields[field].kind == ColumnKind::Number(Scalar::UChar)) {
+        if colors
+            .iter()
+            .all(|&field| self.fields[field].kind == ColumnKind::Number(Scalar::UChar))
+        {
             return Ok(ColorScale {
                 white: 255.0,
                 is_exact: true,
@@ -294,7 +306,10 @@ impl<'a> NewFile<'a> {
             }
         }
         let white = white(false, all.0);
-        let is_exact = WHITES.iter().zip(all.1).any(|(&other, are_bytes)| other == white && are_bytes);
+        let is_exact = WHITES
+            .iter()
+            .zip(all.1)
+            .any(|(&other, are_bytes)| other == white && are_bytes);
         Ok(ColorScale { white, is_exact })
     }
 

@@ -195,7 +195,13 @@ pub(crate) fn separator_before<'a>(layout: &dyn Layout, bytes: &'a [u8], start: 
         .rev()
         .take_while(|byte| layout.is_separator(**byte))
         .count();
-    &bytes[start - length..start]
+    let separator = &bytes[start - length..start];
+    // Of several commas all but the last stand after empty values.
+    let mut marks = (0..length).filter(|&at| matches!(separator[at], b',' | b';'));
+    match (marks.next(), marks.next_back()) {
+        (Some(_), Some(last)) => &separator[last..],
+        _ => separator,
+    }
 }
 
 /// What becomes of the normal that a row has.

@@ -155,7 +155,8 @@ impl XyzLayout {
         };
         self.refuse_decimal_commas(bytes, first_row)?;
         let n_columns = Values::new(first_row.of(bytes)).count();
-        names.retain(|names| Values::new(names.of(bytes)).count() == n_columns);
+        let (names, others): (Vec<Span>, Vec<Span>) =
+            (names.into_iter()).partition(|names| Values::new(names.of(bytes)).count() == n_columns);
         let named = names
             .iter()
             .find_map(|names| Some((*names, columns_by_name(names.of(bytes))?)));
@@ -170,7 +171,42 @@ impl XyzLayout {
                 self.columns[NORMAL].copy_from_slice(&[Some(3), Some(4), Some(5)]);
             }
         }
+        self.refuse_names_to_come(bytes, &others, n_columns)?;
         Ok(row_start)
+    }
+
+    /// Each time that normals are written, rows have three more values, and a line that is not their names now must not become
+    /// them and say that the coordinates are elsewhere.
+    fn refuse_names_to_come(&self, bytes: &[u8], lines: &[Span], n_columns: usize) -> Result<(), Broken> {
+        if self.columns[NORMAL].iter().any(Option::is_some) {
+            return Ok(());
+        }
+        let after = self.columns[COORDINATES]
+            .iter()
+            .flatten()
+            .max()
+            .map_or(0, |&last| last + 1);
+        let added = [Some(after), Some(after + 1), Some(after + 2)];
+        for line in lines {
+            let content = line.of(bytes);
+            let n_names = Values::new(content).count();
+            let may_fit = n_names > n_columns && (n_names - n_columns).is_multiple_of(NORMAL.len());
+            let Some(named) = columns_by_name(content).filter(|_| may_fit) else {
+                continue;
+            };
+            let is_same = named[COORDINATES] == self.columns[COORDINATES]
+                && (named[NORMAL] == added || named[NORMAL] == [None; NORMAL.end - NORMAL.start]);
+            if !is_same {
+                return Err(Broken::new(
+                    self.place(bytes, line.start),
+                    format!(
+                        "{} names {n_names} columns, and the first row has {n_columns} values: correct or remove the line",
+                        quoted(content.trim_ascii())
+                    ),
+                ));
+            }
+        }
+        Ok(())
     }
 
     fn not_a_row(&self, bytes: &[u8], line: Span) -> Broken {

@@ -115,7 +115,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Reading, Broken> {
     };
     let rest = bytes[first.len()..].split_inclusive(|&byte| byte == b'\n');
     for (line, number) in rest.zip(2..) {
-        match parse_event(line, reading.writer.checksum) {
+        let parsed = parse_event(line, reading.writer.checksum);
+        let n_points = reading.recipe.head.scan.n_points;
+        match parsed.and_then(|parsed| check_points(&parsed.0, n_points).map(|()| parsed)) {
             Ok((event, checksum)) => {
                 reading.recipe.events.push(event);
                 reading.writer.checksum = checksum;
@@ -162,6 +164,17 @@ fn parse_event(line: &[u8], before: u32) -> Result<(Event, u32), String> {
     let (body, checksum) = checked(line, before)?;
     let line: EventLine = serde_json::from_slice(&body).map_err(|error| in_words(&error))?;
     Ok((Event::try_from(line)?, checksum))
+}
+
+/// Refuses points that the scan has not, before anything is made of them: a set of four billion takes few bytes here.
+fn check_points(event: &Event, n_points: u64) -> Result<(), String> {
+    let Event::Step(step) = event else { return Ok(()) };
+    match step.change.largest_point() {
+        Some(point) if u64::from(point) >= n_points => Err(format!(
+            "the step names point {point}, and the scan has {n_points} points: it is of another scan"
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// The JSON object of a line without its checksum, which is that of the content.

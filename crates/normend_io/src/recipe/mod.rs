@@ -13,16 +13,16 @@ mod lines;
 #[cfg(test)]
 mod tests;
 
-use std::fs;
 use std::path::Path;
 
 use normend_core::document::State;
-use normend_core::{Document, EditKind, Parameters, StateChange};
+use normend_core::{Document, EditKind, Parameters, Silent, StateChange};
 
 pub use fields::NamedParameters;
 pub use lines::{End, LineWriter, Reading};
 
 use crate::error::{ReadError, WriteError};
+use crate::scan::read_file;
 
 /// The extension of recipes, without the dot.
 pub const EXTENSION: &str = "normend";
@@ -243,14 +243,7 @@ impl Recipe {
 /// [`ReadError`] when there is no such file, it is no recipe, a newer program wrote it, or its first line is damaged. What is
 /// damaged after that is told by [`Reading::end`].
 pub fn read(path: &Path) -> Result<Reading, ReadError> {
-    let io = |source| ReadError::Io {
-        path: path.to_owned(),
-        source,
-    };
-    if fs::metadata(path).map_err(io)?.is_dir() {
-        return Err(io(std::io::ErrorKind::IsADirectory.into()));
-    }
-    let bytes = fs::read(path).map_err(io)?;
+    let bytes = read_file(path, &Silent)?;
     parse(&bytes, &path.display().to_string())
 }
 

@@ -95,7 +95,8 @@ fn any_recipe(n_events: usize) -> impl Strategy<Value = Recipe> {
         prop::option::of(".*"),
         any::<u64>(),
         any::<[u8; 32]>(),
-        any::<u64>(),
+        // Steps name any points.
+        (1_u64 << 32)..,
     );
     let scan = scan.prop_map(|(name, path, n_bytes, hash, n_points)| ScanIdentity {
         name,
