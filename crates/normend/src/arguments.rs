@@ -148,7 +148,12 @@ impl Command {
             Self::Orient(arguments) => Some(arguments.propagation),
             Self::Replay(arguments) => Some(arguments.propagation),
             Self::Bench(arguments) => arguments.command.propagation(),
-            Self::Check(_) | Self::Suspects(_) | Self::Render(_) | Self::Generate(_) | Self::Rehearse(_) => None,
+            Self::Convert(_)
+            | Self::Check(_)
+            | Self::Suspects(_)
+            | Self::Render(_)
+            | Self::Generate(_)
+            | Self::Rehearse(_) => None,
         }
     }
 }
