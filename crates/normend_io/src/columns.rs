@@ -20,6 +20,9 @@ pub(crate) const COLOR_NAMES: [[&str; 3]; 4] = [
     ["scalar_red", "scalar_green", "scalar_blue"],
 ];
 
+/// Names of columns that hold how strongly a point reflects, in lower case.
+pub(crate) const INTENSITY_NAMES: [&str; 3] = ["intensity", "scalar_intensity", "reflectance"];
+
 /// A value that every row has: its name, and which value of the row it is, from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Column {

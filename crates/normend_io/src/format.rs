@@ -8,26 +8,38 @@ use normend_core::Progress;
 use crate::error::{Broken, WriteError};
 use crate::new_file::{Loss, NewFile};
 use crate::output::Output;
-use crate::{new_text, ply, xyz};
+use crate::{e57, las, new_text, pcd, ply, ptx, xyz};
 
 /// The formats that can be read and written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileFormat {
     /// Polygon File Format: ascii, binary little-endian, binary big-endian.
     Ply,
+    /// Of the American Society for Photogrammetry, plain or packed (LAZ).
+    Las,
+    /// Point Cloud Data of PCL: ascii, binary, packed.
+    Pcd,
     /// Text, a point a line: `x y z [nx ny nz …]`.
     Xyz,
+    /// Scans with poses, packed, as laser scanners exchange them (ASTM E2807).
+    E57,
+    /// Text of scanned grids with poses.
+    Ptx,
 }
 
 impl FileFormat {
     /// All formats, in the order of dialogs.
-    pub const ALL: [Self; 2] = [Self::Ply, Self::Xyz];
+    pub const ALL: [Self; 6] = [Self::Ply, Self::Las, Self::Pcd, Self::Xyz, Self::E57, Self::Ptx];
 
     /// The name in dialogs.
     pub fn label(self) -> &'static str {
         match self {
             Self::Ply => "PLY",
+            Self::Las => "LAS/LAZ",
+            Self::Pcd => "PCD",
             Self::Xyz => "XYZ text",
+            Self::E57 => "E57",
+            Self::Ptx => "PTX",
         }
     }
 
@@ -35,6 +47,10 @@ impl FileFormat {
     pub fn extensions(self) -> &'static [&'static str] {
         match self {
             Self::Ply => &["ply"],
+            Self::Las => &["las", "laz"],
+            Self::Pcd => &["pcd"],
+            Self::E57 => &["e57"],
+            Self::Ptx => &["ptx"],
             Self::Xyz => &["xyz", "txt", "asc", "pts", "csv"],
         }
     }
@@ -67,15 +83,20 @@ impl FileFormat {
     pub(crate) fn limit(self, file: &mut NewFile<'_>, path: &Path) -> Vec<Loss> {
         match self {
             Self::Ply => ply::new::limit(file),
+            Self::Las => las::new::limit(file, path),
+            Self::Pcd => pcd::new::limit(file),
             Self::Xyz => new_text::limit(file, path),
+            Self::E57 => e57::new::limit(file),
+            Self::Ptx => ptx::new::limit(file),
         }
     }
 
     /// Whether a new file at `path` can hold confidence.
     pub(crate) fn can_hold_side(self, path: &Path) -> bool {
         match self {
-            Self::Ply => true,
+            Self::Ply | Self::Las | Self::Pcd | Self::E57 => true,
             Self::Xyz => new_text::can_hold_side(path),
+            Self::Ptx => false,
         }
     }
 
@@ -88,17 +109,18 @@ impl FileFormat {
     ) -> Result<(), WriteError> {
         match self {
             Self::Ply => ply::new::write(file, out, progress),
+            Self::Las => las::new::write(file, out, progress),
+            Self::Pcd => pcd::new::write(file, out, progress),
             Self::Xyz => new_text::write(file, out, progress),
+            Self::E57 => e57::new::write(file, out, progress),
+            Self::Ptx => ptx::new::write(file, out, progress),
         }
     }
 }
 
 /// Tells the format by the first bytes, then by the extension of `path`.
 pub(crate) fn recognize(bytes: &[u8], path: &Path) -> Result<FileFormat, Broken> {
-    const OTHERS: [(&[u8], &str); 6] = [
-        (b"LASF", "a LAS or LAZ file"),
-        (b"ASTM-E57", "an E57 file"),
-        (b"# .PCD", "a PCD file"),
+    const OTHERS: [(&[u8], &str); 3] = [
         (b"\x1f\x8b", "compressed with gzip"),
         (b"PK\x03\x04", "a zip archive"),
         (b"\xff\xfe", "text in UTF-16"),
@@ -108,6 +130,18 @@ pub(crate) fn recognize(bytes: &[u8], path: &Path) -> Result<FileFormat, Broken>
     }
     if ply::sniff(bytes) {
         return Ok(FileFormat::Ply);
+    }
+    if las::sniff(bytes) {
+        return Ok(FileFormat::Las);
+    }
+    if pcd::sniff(bytes) {
+        return Ok(FileFormat::Pcd);
+    }
+    if bytes.starts_with(e57::SIGNATURE) {
+        return Ok(FileFormat::E57);
+    }
+    if ptx::sniff(bytes) {
+        return Ok(FileFormat::Ptx);
     }
     if let Some((_, what)) = OTHERS.iter().find(|(start, _)| bytes.starts_with(start)) {
         return Err(Broken::whole(format!(

@@ -20,7 +20,15 @@ mod records;
 
 mod ply;
 
+mod las;
+
+mod pcd;
+
 mod xyz;
+
+mod e57;
+
+mod ptx;
 
 mod scan;
 

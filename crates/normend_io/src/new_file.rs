@@ -5,7 +5,7 @@
 use std::fmt;
 use std::ops::Range;
 
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use normend_core::Progress;
 use rayon::prelude::*;
 
@@ -417,7 +417,10 @@ impl<'a> NewFile<'a> {
                         (table.has_normals && in_scan.is_finite()).then_some(in_scan)
                     };
                     take(&NewRow {
-                        position: frame.map_or(stored, |frame| frame.from_stored.transform_point3(stored)),
+                        position: match layout.is_point(bytes, &spans) {
+                            true => frame.map_or(stored, |frame| frame.from_stored.transform_point3(stored)),
+                            false => DVec3::NAN,
+                        },
                         coordinates: frame.is_none().then_some(coordinates),
                         normal: normal.map(|normal| normal.or_else(given).unwrap_or(NO_NORMAL)),
                         confidence: confidence.flatten(),
@@ -436,6 +439,29 @@ pub(crate) struct ColorScale {
     pub white: f64,
     /// Whether they are multiples of a 255th of it.
     pub is_exact: bool,
+}
+
+/// Where the rows of a scan are measured from, for formats that say so: a rotation and a place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pose {
+    pub turn: DMat3,
+    pub place: DVec3,
+}
+
+impl Pose {
+    /// The pose that a frame stands for; `None` when its coordinates are only scaled and moved, and nobody stood anywhere.
+    pub fn of(frame: &Frame) -> Option<Self> {
+        let is_rigid = frame.from_stored.matrix3 == frame.turn;
+        let is_pose = |place: &DVec3| *place != DVec3::ZERO || frame.turn != DMat3::IDENTITY;
+        let moved = is_rigid.then_some(frame.from_stored.translation).filter(is_pose);
+        let place = frame.station.or(moved)?;
+        Some(Self { turn: frame.turn, place })
+    }
+
+    /// A position of the scan in the scanner's own coordinates.
+    pub fn own(&self, position: DVec3) -> DVec3 {
+        self.turn.transpose() * (position - self.place)
+    }
 }
 
 /// What some decimals have in common.

@@ -16,7 +16,7 @@ use crate::format::{FileFormat, recognize};
 use crate::on_disk::{Content, OnDisk};
 use crate::recipe::ScanIdentity;
 use crate::table::{Layout, read_place, read_points};
-use crate::{ply, xyz};
+use crate::{e57, las, pcd, ply, ptx, xyz};
 
 /// A scan as it was read: the points, and the file itself so that it can be written again with other normals.
 #[derive(Clone)]
@@ -146,7 +146,38 @@ struct Decoded {
 fn decode(format: FileFormat, bytes: Vec<u8>, progress: &dyn Progress) -> Result<Decoded, Stop> {
     let layout: Box<dyn Layout> = match format {
         FileFormat::Ply => Box::new(ply::read(&bytes, progress)?),
+        FileFormat::Las => {
+            // What is unpacked is another content than the file's.
+            let hash = if las::is_packed(&bytes) { OnceLock::from(hash(&bytes)) } else { OnceLock::new() };
+            let (bytes, layout) = las::read(bytes, progress)?;
+            return Ok(Decoded {
+                bytes,
+                layout: Box::new(layout),
+                hash,
+            });
+        }
+        FileFormat::Pcd => {
+            let pcd = pcd::read(&bytes, progress)?;
+            if let Some(unpacked) = pcd.unpacked {
+                return Ok(Decoded {
+                    hash: OnceLock::from(hash(&bytes)),
+                    bytes: unpacked,
+                    layout: Box::new(pcd.layout),
+                });
+            }
+            Box::new(pcd.layout)
+        }
         FileFormat::Xyz => Box::new(xyz::read(&bytes, progress)?),
+        FileFormat::Ptx => Box::new(ptx::read(&bytes, progress)?),
+        FileFormat::E57 => {
+            let hash = OnceLock::from(hash(&bytes));
+            let (bytes, layout) = e57::read(bytes, progress)?;
+            return Ok(Decoded {
+                bytes,
+                layout: Box::new(layout),
+                hash,
+            });
+        }
     };
     Ok(Decoded {
         bytes,

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use crate::columns::Column;
 use crate::error::{Broken, Place, Stop, WriteError, quoted};
+use crate::new_file::Loss;
 use crate::output::Output;
 use crate::rewrite::RowNormals;
 use crate::value::ValueType;
@@ -232,6 +233,11 @@ pub(crate) trait Layout: Send + Sync {
     /// The place of a byte for messages.
     fn place(&self, bytes: &[u8], byte: usize) -> Place;
 
+    /// Whether a row is a point, as far as the format says; one that is not counts as one without finite coordinates.
+    fn is_point(&self, _bytes: &[u8], _spans: &Spans) -> bool {
+        true
+    }
+
     /// Whether this byte separates values in text.
     fn is_separator(&self, byte: u8) -> bool {
         is_space(byte)
@@ -256,8 +262,18 @@ pub(crate) trait Layout: Send + Sync {
         Vec::new()
     }
 
+    /// What is to be known of a file that is written again, though it keeps everything.
+    fn remarks(&self) -> Vec<Loss> {
+        Vec::new()
+    }
+
     /// Whether confidence can be written.
     fn can_hold_side(&self) -> bool;
+
+    /// Writes the file again as it is, packed or not as the target's name says; `None` for formats of one kind.
+    fn copy(&self, _bytes: &[u8], _out: &mut Output<'_>, _progress: &dyn Progress) -> Option<Result<(), WriteError>> {
+        None
+    }
 
     /// Writes the file again with other normals and nothing else changed.
     fn rewrite(
@@ -534,6 +550,9 @@ fn read_part(
         if let Some(frame) = frames.next().flatten() {
             position = frame.from_stored.transform_point3(position);
             normal = frame.normal_from_stored(normal);
+        }
+        if !layout.is_point(bytes, &spans) {
+            position = DVec3::NAN;
         }
         take(row, position, normal);
     }

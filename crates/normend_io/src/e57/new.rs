@@ -5,16 +5,16 @@ use std::io;
 
 use e57::{E57Writer, Extension, Quaternion, RawValues, Record, RecordDataType, RecordName, RecordValue};
 use e57::{Transform, Translation};
-use glam::{DMat3, DQuat, DVec3, Vec3};
+use glam::{DQuat, DVec3, Vec3};
 use normend_core::Progress;
 use normend_core::confidence::UNDECIDED;
 use normend_core::progress::Part;
 use rayon::prelude::*;
 
 use super::metadata::{NORMALS_URI, OWN_URI};
-use crate::columns::{COLOR_NAMES, ColumnKind};
+use crate::columns::{COLOR_NAMES, ColumnKind, INTENSITY_NAMES};
 use crate::error::{Stop, WriteError};
-use crate::new_file::{Cell, Loss, NewFile, NewRow, plain_names};
+use crate::new_file::{Cell, Loss, NewFile, NewRow, Pose, plain_names};
 use crate::output::Output;
 use crate::rewrite::share_of;
 use crate::table::{Frame, PART_ROWS, VALUE_NAMES};
@@ -22,9 +22,6 @@ use crate::value::Scalar;
 
 /// The most values besides place and normal: rows of more do not fit into packets.
 const MOST_FIELDS: usize = 800;
-
-/// Names of how strongly a point reflects, in lower case.
-const INTENSITY_NAMES: [&str; 3] = ["intensity", "scalar_intensity", "reflectance"];
 
 /// Drops what E57 cannot hold.
 pub(crate) fn limit(file: &mut NewFile<'_>) -> Vec<Loss> {
@@ -93,46 +90,25 @@ fn ranges(file: &NewFile<'_>, progress: &dyn Progress) -> Result<Ranges, Stop> {
     Ok(joined)
 }
 
-/// Where the rows of a scan are measured from: a rotation and a place.
-#[derive(Clone, Copy)]
-struct Pose {
-    turn: DMat3,
-    place: DVec3,
-}
-
-impl Pose {
-    /// The pose that a frame stands for; `None` when its coordinates are only scaled and moved, and nobody stood anywhere.
-    fn of(frame: &Frame) -> Option<Self> {
-        let is_rigid = frame.from_stored.matrix3 == frame.turn;
-        let moved = is_rigid.then_some(frame.from_stored.translation);
-        let place = frame
-            .station
-            .or(moved.filter(|place| *place != DVec3::ZERO || frame.turn != DMat3::IDENTITY));
-        place.map(|place| Self {
-            turn: frame.turn,
-            place,
-        })
+/// A pose as E57 has it.
+fn transform(pose: &Pose) -> Transform {
+    let mut turn = DQuat::from_mat3(&pose.turn);
+    // The standard asks for a scalar part that is not negative.
+    if turn.w < 0.0 {
+        turn = -turn;
     }
-
-    fn transform(&self) -> Transform {
-        let mut turn = DQuat::from_mat3(&self.turn);
-        // The standard asks for a scalar part that is not negative.
-        if turn.w < 0.0 {
-            turn = -turn;
-        }
-        Transform {
-            rotation: Quaternion {
-                w: turn.w,
-                x: turn.x,
-                y: turn.y,
-                z: turn.z,
-            },
-            translation: Translation {
-                x: self.place.x,
-                y: self.place.y,
-                z: self.place.z,
-            },
-        }
+    Transform {
+        rotation: Quaternion {
+            w: turn.w,
+            x: turn.x,
+            y: turn.y,
+            z: turn.z,
+        },
+        translation: Translation {
+            x: pose.place.x,
+            y: pose.place.y,
+            z: pose.place.z,
+        },
     }
 }
 
@@ -269,7 +245,7 @@ impl<'a> Rows<'a> {
         let mut values = RawValues::with_capacity(self.prototype.len());
         let is_point = row.position.is_finite();
         let own = match (is_point, pose) {
-            (true, Some(pose)) => pose.turn.transpose() * (row.position - pose.place),
+            (true, Some(pose)) => pose.own(row.position),
             (true, None) => row.position,
             (false, _) => DVec3::ZERO,
         };
@@ -423,7 +399,7 @@ pub(crate) fn write(file: &mut NewFile<'_>, out: &mut Output<'_>, progress: &dyn
         }
         scan.set_name(Some(frame.name.trim()).filter(|name| !name.is_empty()).map(printable));
         scan.set_description(file.comment.map(printable));
-        scan.set_transform(pose.as_ref().map(Pose::transform));
+        scan.set_transform(pose.as_ref().map(transform));
         scan.finalize().map_err(fail)?;
     }
     writer.finalize().map_err(fail)
