@@ -5,6 +5,7 @@
 
 use std::collections::{BTreeMap, HashSet};
 use std::io::Cursor;
+use std::iter;
 use std::ops::Range;
 
 use e57::{E57Reader, RecordDataType};
@@ -15,8 +16,10 @@ use roxmltree::{Document, Node, NodeId};
 use super::sections::MOST_RECORDS;
 use crate::error::{Broken, quoted};
 
-/// The namespace of normals: the extension of the E57 committee, which CloudCompare and libE57Format write as well.
+/// The namespace of normals, an extension of the E57 committee: the one that CloudCompare and PDAL write.
 pub(super) const NORMALS_URI: &str = "http://www.libe57.org/E57_NOR_surface_normals.txt";
+/// The same, as MeshLab and the simple interface of libE57Format write it: that of the page that describes it.
+pub(super) const NORMALS_PAGE_URI: &str = "http://www.libe57.org/E57_EXT_surface_normals.txt";
 /// The namespace of what E57 has no name for.
 pub(super) const OWN_URI: &str = "urn:normend:e57:1";
 
@@ -277,6 +280,7 @@ fn column_name(node: Node<'_, '_>) -> String {
     let tag = node.tag_name();
     let uri = tag.namespace().unwrap_or_default();
     let prefix = node.lookup_prefix(uri).unwrap_or_default();
+    let is_normals = [NORMALS_URI, NORMALS_PAGE_URI].contains(&uri);
     let name = match tag.name() {
         "cartesianX" => "x",
         "cartesianY" => "y",
@@ -284,9 +288,9 @@ fn column_name(node: Node<'_, '_>) -> String {
         "colorRed" => "red",
         "colorGreen" => "green",
         "colorBlue" => "blue",
-        "normalX" if uri == NORMALS_URI => "nx",
-        "normalY" if uri == NORMALS_URI => "ny",
-        "normalZ" if uri == NORMALS_URI => "nz",
+        "normalX" if is_normals => "nx",
+        "normalY" if is_normals => "ny",
+        "normalZ" if is_normals => "nz",
         other if prefix.is_empty() || uri == OWN_URI => other,
         other => return format!("{prefix}:{other}"),
     };
@@ -349,7 +353,10 @@ impl Edits {
         let mut prefix_of = BTreeMap::new();
         for record in scans.iter().flat_map(|(_, records)| records) {
             prefix_of.entry(record.uri).or_insert_with(|| {
-                let declared = root.lookup_prefix(record.uri).filter(|prefix| !prefix.is_empty());
+                let page = (record.uri == NORMALS_URI).then_some(NORMALS_PAGE_URI);
+                let declared = iter::once(record.uri)
+                    .chain(page)
+                    .find_map(|uri| root.lookup_prefix(uri).filter(|prefix| !prefix.is_empty()));
                 declared.map_or_else(
                     || {
                         let base = if record.uri == NORMALS_URI { "nor" } else { "normend" };
@@ -433,4 +440,21 @@ impl Edits {
 fn offset_edit(node: Node<'_, '_>, offset: u64) -> Option<(Range<usize>, String)> {
     let attribute = node.attribute_node("fileOffset")?;
     Some((attribute.range_value(), offset.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_are_known_by_both_addresses_of_their_extension() {
+        let name_in = |uri: &str| {
+            let xml = format!("<a xmlns:nor=\"{uri}\"><nor:normalY/></a>");
+            let document = Document::parse(&xml).unwrap();
+            column_name(document.root_element().first_element_child().unwrap())
+        };
+        assert_eq!(name_in(NORMALS_URI), "ny");
+        assert_eq!(name_in(NORMALS_PAGE_URI), "ny");
+        assert_eq!(name_in("urn:other"), "nor:normalY");
+    }
 }
