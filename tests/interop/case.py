@@ -10,18 +10,28 @@ from pathlib import Path
 import numpy as np
 from plyfile import PlyData
 
-from clouds import CLOUDS, NAMES, Cloud, write_plain_ply
+from clouds import CLOUDS, Cloud, of_columns, write_plain_ply
 from compare import FLOAT, SHORTEST, Kept, Outcome, compare
 
 NORMEND = os.environ.get("NORMEND", "normend")
 
 
-def normend(source: Path, target: Path) -> None:
-    """Has Normend read `source` and write `target` with the normals that came, each on its side."""
-    typed = [NORMEND, "orient", source, "-o", target, "--start", "keep", "--rule", "given", "--quiet"]
-    run = subprocess.run(typed, capture_output=True, text=True, check=False)
-    if run.returncode:
-        raise RuntimeError(f"normend: {run.stderr.strip()}")
+def normend(*typed) -> None:
+    """Runs Normend to its end."""
+    done = subprocess.run([NORMEND, *map(str, typed), "--quiet"], capture_output=True, text=True, check=False)
+    if done.returncode:
+        sentence = (done.stderr.strip() or "no word").splitlines()[0]
+        raise RuntimeError(f"normend {typed[0]} ended with {done.returncode}: {sentence}")
+
+
+def export(source: Path, target: Path) -> None:
+    """Has Normend write `target` with the normals of `source`, each on its side."""
+    normend("orient", source, "-o", target, "--start", "keep", "--rule", "given")
+
+
+def convert(source: Path, target: Path) -> None:
+    """Has Normend write `target` as `source` is."""
+    normend("convert", source, "-o", target)
 
 
 def run(*typed, **options) -> str:
@@ -37,21 +47,13 @@ def read_table(path: Path, delimiter=None) -> Cloud:
     with open(path, encoding="utf-8") as file:
         names = file.readline().lstrip("#/ ").strip().split(delimiter)
     rows = np.loadtxt(path, skiprows=1, ndmin=2, delimiter=delimiter)
-    columns = {name.strip(): rows[:, index] for index, name in enumerate(names)}
-    take = lambda *chosen: np.column_stack([columns.pop(name) for name in chosen])
-    positions = take("x", "y", "z")
-    normals = take("nx", "ny", "nz").astype(np.float32) if "nx" in columns else None
-    return Cloud(positions, normals, columns)
+    return of_columns({name.strip(): rows[:, index] for index, name in enumerate(names)})
 
 
 def read_ply(path: Path) -> Cloud:
     """Reads x y z, nx ny nz and all else with plyfile."""
     vertex = PlyData.read(path)["vertex"]
-    columns = {of.name: np.asarray(vertex[of.name]) for of in vertex.properties}
-    take = lambda *chosen: np.column_stack([columns.pop(name) for name in chosen])
-    positions = take("x", "y", "z").astype(np.float64)
-    normals = take("nx", "ny", "nz") if "nx" in columns else None
-    return Cloud(positions, normals, columns)
+    return of_columns({of.name: np.asarray(vertex[of.name]) for of in vertex.properties})
 
 
 @dataclass
@@ -92,17 +94,21 @@ class Case:
     # The file that Normend starts from, if it is no binary PLY, and its extension.
     write_source: Callable[[Cloud, Path], None] = write_plain_ply
     source_extension: str = ".ply"
-    # What values are called in its files, where that is not their name here.
-    called: dict[str, str] = field(default_factory=dict)
+    # What else is the same in its file and in our export of that, in words, and how to tell: faults of the two files.
+    untouched: tuple[str, Callable[[Path, Path], list[str]]] | None = None
+    # Columns as Normend reads them in its files, made to the values of the cloud.
+    values_of: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]] = dict
+    clouds: dict[str, Cloud] = field(default_factory=lambda: CLOUDS)
     # The values that clouds are given; None: all.
     only: tuple[str, ...] | None = None
-    # Clouds that are not tried, with the reason for the table.
+    # Clouds that are not tried, with the reason for the table; and those not tried in files that Normend makes of a PLY.
     without: dict[str, str] = field(default_factory=dict)
+    without_made: dict[str, str] = field(default_factory=dict)
 
     def _they_read_ours(self, cloud: Cloud, folder: Path) -> Outcome:
         source, ours = folder / f"source{self.source_extension}", folder / f"ours{self.extension}"
         self.write_source(cloud, source)
-        normend(source, ours)
+        export(source, ours)
         return compare(cloud, self.read(ours), [self.made, self.reads])
 
     def _we_read_theirs(self, cloud: Cloud, folder: Path) -> Outcome:
@@ -111,41 +117,46 @@ class Case:
         # To another format, so that each number is understood and not just copied.
         if self.extension == ".ply":
             ours = folder / "ours.csv"
-            normend(theirs, ours)
-            return compare(cloud, self._renamed(read_table(ours, ",")), [self.writes, TEXT])
-        ours = folder / "ours.ply"
-        normend(theirs, ours)
-        return compare(cloud, self._renamed(read_ply(ours)), [self.writes, PLY])
-
-    def _renamed(self, cloud: Cloud) -> Cloud:
-        names = {theirs: name for name, theirs in self.called.items()}
-        return replace(cloud, values={names.get(name, name): of for name, of in cloud.values.items()})
+            convert(theirs, ours)
+            got, converted = read_table(ours, ","), TEXT
+        else:
+            ours = folder / "ours.ply"
+            convert(theirs, ours)
+            got, converted = read_ply(ours), PLY
+        return compare(cloud, replace(got, values=self.values_of(got.values)), [self.writes, converted])
 
     def _they_read_theirs(self, cloud: Cloud, folder: Path) -> Outcome:
         theirs, ours = folder / f"theirs{self.extension}", folder / f"ours{self.extension}"
         self.write(cloud, theirs)
-        normend(theirs, ours)
+        export(theirs, ours)
+        if self.untouched and (faults := self.untouched[1](theirs, ours)):
+            raise ValueError("; ".join(faults))
         return compare(cloud, self.read(ours), [self.writes, self.reads])
 
     def rows(self, folder: Path) -> list[Row]:
         """A row for each way."""
         rows = []
         if self.read:
-            rows.append(self._row("we write, it reads", self._they_read_ours, [self.reads], folder))
+            without = self.without | self.without_made
+            rows.append(self._row("we write, it reads", self._they_read_ours, [self.reads], without, folder))
         if self.write:
-            rows.append(self._row("it writes, we read", self._we_read_theirs, [self.writes], folder))
+            rows.append(self._row("it writes, we read", self._we_read_theirs, [self.writes], self.without, folder))
         if self.read and self.write:
             kept = [self.writes, self.reads]
-            rows.append(self._row("it writes, we export, it reads", self._they_read_theirs, kept, folder))
+            way = "it writes, we export, it reads"
+            rows.append(self._row(way, self._they_read_theirs, kept, self.without, folder))
+            if self.untouched and not rows[-1].faults:
+                rows[-1].values += f"; {self.untouched[0]}"
         return rows
 
-    def _row(self, way: str, go, programs: list[Kept], folder: Path) -> Row:
-        remarks = [kept.remark for kept in programs] + [f"{name} not tried: {why}" for name, why in self.without.items()]
+    def _row(self, way: str, go, programs: list[Kept], without: dict[str, str], folder: Path) -> Row:
+        remarks = [kept.remark for kept in programs]
+        remarks += [f"{name} not tried: {why}" for name, why in without.items()]
         row = Row(f"{self.program} {version_of(self.program)}", self.format, way)
         row.remark = "; ".join(dict.fromkeys(remark for remark in remarks if remark))
         total = None
-        for name, cloud in CLOUDS.items():
-            if name in self.without:
+        for name, cloud in self.clouds.items():
+            if name in without:
                 continue
             if self.only is not None:
                 cloud = replace(cloud, values={kept: cloud.values[kept] for kept in self.only})
@@ -164,8 +175,8 @@ class Case:
 
 
 # What comes through text and through a PLY that Normend makes of another format: all.
-TEXT = Kept(points=SHORTEST, normals=SHORTEST, values=dict.fromkeys(NAMES, SHORTEST))
-PLY = Kept(normals=FLOAT, values=dict.fromkeys(NAMES, SHORTEST))
+TEXT = Kept(points=SHORTEST, normals=SHORTEST, others=SHORTEST)
+PLY = Kept(normals=FLOAT, others=SHORTEST)
 
 
 def version_of(program: str) -> str:

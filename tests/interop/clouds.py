@@ -35,6 +35,14 @@ class Cloud:
         return np.column_stack([self.values[name] for name in COLORS])
 
 
+def of_columns(columns: dict[str, np.ndarray], normal=("nx", "ny", "nz")) -> Cloud:
+    """A cloud of named columns: x y z, a normal if there is one, and the rest."""
+    rest = {name: of for name, of in columns.items() if name not in ("x", "y", "z", *normal)}
+    positions = np.column_stack([columns[name] for name in "xyz"]).astype(np.float64)
+    normals = np.column_stack([columns[name] for name in normal]) if normal[0] in columns else None
+    return Cloud(positions, normals, rest)
+
+
 def with_colors(colors) -> dict[str, np.ndarray]:
     """Values of n x 3 bytes, or of shares of 1."""
     colors = np.asarray(colors)

@@ -15,11 +15,15 @@ class Held:
     cast: type | None = None
     # Then at most this much off.
     error: float = 0.0
+    # Multiplied before: eight bits that become sixteen.
+    factor: int = 1
     # Written with as few digits as tell a float from its neighbors: what was float is so when it is rounded to one again.
     shortest: bool = False
 
     def of(self, values):
         """The numbers as they are held."""
+        if self.factor != 1:
+            values = np.asarray(values).astype(np.int64) * self.factor
         return values if self.cast is None else np.asarray(values).astype(self.cast)
 
 
@@ -45,17 +49,23 @@ class Kept:
     normals: Held | None = SAME
     # The other values that it keeps, by name.
     values: dict[str, Held] = field(default_factory=dict)
+    # How it holds those without a name there; None: not at all.
+    others: Held | None = None
     # Rows without a place are left out.
     leaves_out_holes: bool = False
     # What it cannot do, for the table.
     remark: str = ""
+
+    def value(self, name: str) -> Held | None:
+        """How it holds a value, if it does."""
+        return self.values.get(name, self.others)
 
     def apply(self, cloud: Cloud) -> Cloud:
         """The cloud, as it is to be after this program."""
         if self.leaves_out_holes:
             cloud = cloud.finite()
         normals = None if self.normals is None or cloud.normals is None else self.normals.of(cloud.normals)
-        values = {name: held.of(cloud.values[name]) for name, held in self.values.items() if name in cloud.values}
+        values = {name: held.of(of) for name, of in cloud.values.items() if (held := self.value(name))}
         return Cloud(np.asarray(self.points.of(cloud.positions), np.float64), normals, values)
 
 
@@ -71,12 +81,14 @@ class Measure:
     # Differences that rounding to float does not explain.
     error: float = 0.0
     as_float: bool = False
+    factor: int = 1
     # What is wrong; empty where all is as it should be.
     fault: str = ""
 
     def over(self, other: "Measure") -> "Measure":
         """The worse of both."""
-        return Measure(max(self.error, other.error), self.as_float or other.as_float, self.fault or other.fault)
+        error, as_float = max(self.error, other.error), self.as_float or other.as_float
+        return Measure(error, as_float, max(self.factor, other.factor), self.fault or other.fault)
 
     def __str__(self) -> str:
         if self.fault:
@@ -86,7 +98,9 @@ class Measure:
             decade = 10.0 ** np.floor(np.log10(self.error))
             step = decade * next(step for step in (1, 2, 5, 10) if self.error <= step * decade * (1 + 1e-6))
             return f"within {step:.0e}".replace("e-0", "e-") if step < 1e-3 else f"within {step:g}"
-        return "as float" if self.as_float else "same"
+        if self.as_float:
+            return "as float"
+        return "same" if self.factor == 1 else f"times {self.factor}"
 
 
 def _are_floats(values) -> bool:
@@ -116,7 +130,9 @@ def measure(name: str, original, expected, got, held: list[Held]) -> Measure:
     if worst > (allowed + 4 * np.finfo(np.float64).eps * largest if allowed else 0.0):
         at = int(off.reshape(len(off), -1).max(axis=1).argmax())
         return Measure(fault=f"{name}: {got[at]} instead of {expected[at]} at point {at}")
-    return Measure(error=worst, as_float=float(_difference(got, original).max(initial=0.0)) > worst)
+    factor = max((one.factor for one in held), default=1)
+    rounded = factor == 1 and float(_difference(got, original).max(initial=0.0)) > worst
+    return Measure(error=worst, as_float=rounded, factor=factor)
 
 
 @dataclass
@@ -169,7 +185,7 @@ def compare(original: Cloud, got: Cloud, programs: list[Kept]) -> Outcome:
             normals = measure("normals", original.normals, expected.normals, got.normals, held)
     values = {}
     for name, of in expected.values.items():
-        held = [kept.values[name] for kept in programs]
+        held = [kept.value(name) for kept in programs]
         values[name] = Measure(fault=f"{name}: did not come")
         if name in got.values:
             values[name] = measure(name, original.values[name], of, got.values[name], held)

@@ -15,7 +15,7 @@ from case import Row
 def rows_of(program: str, folder: Path) -> list[Row]:
     """The rows of one program, in a process of its own: some crash, and some cannot be loaded beside each other."""
     typed = [sys.executable, __file__, "--alone", program, "--folder", str(folder)]
-    done = subprocess.run(typed, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+    done = subprocess.run(typed, capture_output=True, text=True, check=False)
     try:
         return [Row(**row) for row in json.loads(done.stdout.strip().splitlines()[-1])]
     except (IndexError, json.JSONDecodeError):

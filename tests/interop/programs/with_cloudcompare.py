@@ -1,5 +1,7 @@
 """CloudCompare, by its command line: PLY and text."""
 
+from dataclasses import replace
+
 from case import TEXT, Case, read_ply, run
 from clouds import COLORS, Cloud, write_plain_ply
 from compare import Kept, same, within
@@ -9,7 +11,25 @@ def convert(source, target, *options) -> None:
     """Has CloudCompare open a file and save another."""
     # What is shifted is held as float; near the middle of the clouds that is precise.
     shift = ["-GLOBAL_SHIFT", "-500000", "-4500000", "0"] if "UTM" in str(source) else []
-    run("CloudCompare", "-SILENT", "-AUTO_SAVE", "OFF", "-NO_TIMESTAMP", *options, "-O", *shift, source, "-SAVE_CLOUDS", "FILE", target)
+    run(
+        "CloudCompare",
+        "-SILENT",
+        "-AUTO_SAVE",
+        "OFF",
+        "-NO_TIMESTAMP",
+        *options,
+        "-O",
+        *shift,
+        source,
+        "-SAVE_CLOUDS",
+        "FILE",
+        target,
+    )
+
+
+def plain_names(values: dict) -> dict:
+    """What CloudCompare calls a scalar field of a PLY, by its own name."""
+    return {name.removeprefix("scalar_"): of for name, of in values.items()}
 
 
 def read(path) -> Cloud:
@@ -17,15 +37,16 @@ def read(path) -> Cloud:
     ply = path.with_suffix(".cloudcompare.ply")
     convert(path, ply, "-C_EXPORT_FMT", "PLY", "-PLY_EXPORT_FMT", "BINARY_LE")
     cloud = read_ply(ply)
-    cloud.values = {name.removeprefix("scalar_"): of for name, of in cloud.values.items()}
-    return cloud
+    return replace(cloud, values=plain_names(cloud.values))
 
 
 def write(cloud: Cloud, path) -> None:
     """Has CloudCompare read a plain PLY and save it."""
     plain = path.with_suffix(".plain.ply")
     write_plain_ply(cloud, plain)
-    kind = {".ply": ("PLY", "-PLY_EXPORT_FMT", "BINARY_LE"), ".xyz": ("ASC", "-PREC", "9", "-SEP", "SPACE")}[path.suffix]
+    kind = {".ply": ("PLY", "-PLY_EXPORT_FMT", "BINARY_LE"), ".xyz": ("ASC", "-PREC", "9", "-SEP", "SPACE")}[
+        path.suffix
+    ]
     convert(plain, path, "-C_EXPORT_FMT", *kind)
 
 
@@ -44,7 +65,7 @@ CASES = [
         reads=Kept(points=within(1e-5), normals=NORMALS, values=same((*COLORS, "intensity")), remark=ROUNDS),
         writes=Kept(points=within(1e-5), normals=NORMALS, values=same((*COLORS, "intensity")), remark=ROUNDS),
         made=Kept(values=same((*COLORS, "intensity"))),
-        called={"intensity": "scalar_intensity"},
+        values_of=plain_names,
         without=HOLES,
     ),
     Case(
@@ -65,5 +86,14 @@ CASES = [
         made=Kept(leaves_out_holes=True),
         reads=Kept(points=within(1e-5), normals=NORMALS, remark=ROUNDS),
         only=(),
+    ),
+    Case(
+        program="CloudCompare",
+        format="PTX",
+        extension=".ptx",
+        read=read,
+        made=Kept(leaves_out_holes=True),
+        reads=Kept(points=within(1e-5), normals=None, values=same(COLORS), remark="reads no normals"),
+        only=COLORS,
     ),
 ]

@@ -3,11 +3,10 @@
 import numpy as np
 
 from case import TEXT, Case
-from clouds import NAMES, Cloud
-from compare import Kept, same
+from clouds import NAMES, Cloud, of_columns
+from compare import SAME, Kept
 
 COLUMNS = ("x", "y", "z", "nx", "ny", "nz", *NAMES)
-ALL = same(NAMES)
 
 
 def write(cloud: Cloud, path, delimiter=" ", comments="") -> None:
@@ -19,9 +18,7 @@ def write(cloud: Cloud, path, delimiter=" ", comments="") -> None:
 def read(path, delimiter=None) -> Cloud:
     """Reads columns by their names."""
     table = np.atleast_1d(np.genfromtxt(path, delimiter=delimiter, names=True, deletechars=""))
-    columns = {name: table[name] for name in table.dtype.names}
-    take = lambda *chosen: np.column_stack([columns.pop(name) for name in chosen])
-    return Cloud(take("x", "y", "z"), take("nx", "ny", "nz"), columns)
+    return of_columns({name: table[name] for name in table.dtype.names})
 
 
 def write_bare(cloud: Cloud, path) -> None:
@@ -36,15 +33,23 @@ def read_bare(path) -> Cloud:
 
 
 CASES = [
-    Case(program="numpy", format="text, x y z nx ny nz", extension=".xyz", read=read_bare, write=write_bare, made=TEXT, only=()),
+    Case(
+        program="numpy",
+        format="text, x y z nx ny nz",
+        extension=".xyz",
+        read=read_bare,
+        write=write_bare,
+        made=TEXT,
+        only=(),
+    ),
     Case(
         program="numpy",
         format="CSV",
         extension=".csv",
         read=lambda path: read(path, ","),
         write=lambda cloud, path: write(cloud, path, ","),
-        reads=Kept(values=ALL),
-        writes=Kept(values=ALL),
+        reads=Kept(others=SAME),
+        writes=Kept(others=SAME),
         made=TEXT,
     ),
     Case(
@@ -55,8 +60,8 @@ CASES = [
         read=lambda path: read(path, "\t"),
         write_source=lambda cloud, path: write(cloud, path, "\t", "# "),
         source_extension=".txt",
-        reads=Kept(values=ALL),
-        writes=Kept(values=ALL),
-        made=Kept(values=ALL),
+        reads=Kept(others=SAME),
+        writes=Kept(others=SAME),
+        made=Kept(others=SAME),
     ),
 ]

@@ -50,7 +50,65 @@ def write_text(cloud: Cloud, path) -> None:
     by_its_name.rename(path)
 
 
+def splats() -> Cloud:
+    """Gaussian splats: colors as harmonics, opacity, size, turn."""
+    random = np.random.default_rng(3)
+    n = 200
+    normals = random.normal(size=(n, 3))
+    values = {"f_dc": (n, 3), "f_rest": (n, 15, 3), "opacity": (n,), "scale": (n, 3), "rot": (n, 4)}
+    values = {name: random.normal(size=shape).astype(np.float32) for name, shape in values.items()}
+    # Sizes are kept as logarithms in files only.
+    values["scale"] = np.exp(values["scale"])
+    unit = normals / np.linalg.norm(normals, axis=1)[:, None]
+    return Cloud(random.normal(size=(n, 3)).astype(np.float32).astype(np.float64), unit.astype(np.float32), values)
+
+
+def write_splats(cloud: Cloud, path) -> None:
+    """Has Open3D write splats."""
+    tensors = o3d.t.geometry.PointCloud(Tensor(cloud.positions.astype(np.float32)))
+    tensors.point["normals"] = Tensor(cloud.normals)
+    for name, of in cloud.values.items():
+        tensors.point[name] = Tensor(of if of.ndim > 1 else of[:, None])
+    if not o3d.t.io.write_point_cloud(str(path), tensors):
+        raise RuntimeError("Open3D did not write the file")
+
+
+def read_splats(path) -> Cloud:
+    """Has Open3D read splats."""
+    point = o3d.t.io.read_point_cloud(str(path)).point
+    columns = {name: point[name].numpy() for name in point}
+    columns["opacity"] = columns["opacity"][:, 0]
+    return Cloud(columns.pop("positions").astype(np.float64), columns.pop("normals"), columns)
+
+
+def splats_of(columns: dict) -> dict:
+    """The columns of a file of splats, gathered as Open3D does."""
+
+    def gather(name: str, n: int):
+        return np.column_stack([columns[f"{name}_{index}"] for index in range(n)])
+
+    return {
+        "f_dc": gather("f_dc", 3),
+        # Channel by channel.
+        "f_rest": gather("f_rest", 45).reshape(-1, 3, 15).transpose(0, 2, 1),
+        "opacity": columns["opacity"],
+        "scale": np.exp(gather("scale", 3)),
+        "rot": gather("rot", 4),
+    }
+
+
+def write_pcd(cloud: Cloud, path, **options) -> None:
+    """Writes normals as double too: Open3D declares them so, whatever they are."""
+    write(Cloud(cloud.positions, cloud.normals.astype(np.float64), cloud.values), path, **options)
+
+
 ATTRIBUTES = same((*COLORS, "classification", "gps_time", "range", "target"))
+
+SPLATS = Kept(values=same(splats().values) | {"scale": within(1e-5)})
+# Ten digits in all.
+PCD_TEXT = Kept(
+    points=within(1e-9), normals=within(1e-9), values=ATTRIBUTES | {"gps_time": within(0.5)}, remark="writes ten digits"
+)
 
 CASES = [
     Case(
@@ -72,5 +130,36 @@ CASES = [
         made=TEXT,
         only=(),
         writes=Kept(points=within(1e-10), normals=within(1e-7), remark="writes ten digits after the point"),
+    ),
+    Case(
+        program="Open3D",
+        format="PLY, Gaussian splats",
+        extension=".ply",
+        read=read_splats,
+        write=write_splats,
+        write_source=write_splats,
+        clouds={"splats": splats()},
+        values_of=splats_of,
+        reads=SPLATS,
+        writes=SPLATS,
+        made=SPLATS,
+    ),
+    *(
+        Case(
+            program="Open3D",
+            format=f"PCD, {name}",
+            extension=".pcd",
+            read=read,
+            write=lambda cloud, path, options=options: write_pcd(cloud, path, **options),
+            reads=Kept(values=ATTRIBUTES),
+            writes=kept,
+            made=Kept(values=ATTRIBUTES),
+            without_made={"UTM": "it takes normals for as wide as coordinates"},
+        )
+        for name, options, kept in (
+            ("text", {"write_ascii": True}, PCD_TEXT),
+            ("binary", {}, Kept(values=ATTRIBUTES)),
+            ("compressed", {"compressed": True}, Kept(values=ATTRIBUTES)),
+        )
     ),
 ]

@@ -4,10 +4,8 @@ import numpy as np
 from plyfile import PlyData, PlyElement
 
 from case import Case, read_ply
-from clouds import NAMES, Cloud, write_plain_ply
-from compare import Kept, same
-
-ALL = same(NAMES)
+from clouds import Cloud, write_plain_ply
+from compare import SAME, Kept
 
 
 def write(cloud: Cloud, path, text=False, byte_order="<") -> None:
@@ -28,9 +26,9 @@ def _case(name: str, encoding: str, **options) -> Case:
         extension=".ply",
         read=read_ply,
         write=lambda cloud, path: write(cloud, path, **options),
-        reads=Kept(values=ALL),
-        writes=Kept(values=ALL),
-        made=Kept(values=ALL),
+        reads=Kept(others=SAME),
+        writes=Kept(others=SAME),
+        made=Kept(others=SAME),
         write_source=lambda cloud, path: write_plain_ply(cloud, path, encoding),
     )
 

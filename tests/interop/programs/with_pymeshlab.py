@@ -1,19 +1,26 @@
 """MeshLab: PLY and text."""
 
+import numpy as np
 import pymeshlab
 
 from case import TEXT, Case
 from clouds import COLORS, Cloud, with_colors, write_plain_ply
-from compare import Kept, same, within
+from compare import FLOAT, Kept, same, within
 
 
 def read(path) -> Cloud:
-    """Reads positions, normals and colors; the rest would have to be named one by one."""
+    """Reads positions, normals and colors of all meshes of a file, where these stand; the rest would have to be named one by one."""
     meshes = pymeshlab.MeshSet()
     meshes.load_new_mesh(str(path))
-    mesh = meshes.current_mesh()
-    colors = with_colors(mesh.vertex_color_matrix()[:, :3]) if mesh.has_vertex_color() else {}
-    return Cloud(mesh.vertex_matrix(), mesh.vertex_normal_matrix(), colors)
+    positions, normals, colors = [], [], []
+    for mesh in meshes:
+        place = mesh.transform_matrix()
+        positions.append(mesh.vertex_matrix() @ place[:3, :3].T + place[:3, 3])
+        normals.append(mesh.vertex_normal_matrix() @ place[:3, :3].T)
+        if mesh.has_vertex_color():
+            colors.append(mesh.vertex_color_matrix()[:, :3])
+    values = with_colors(np.concatenate(colors)) if colors else {}
+    return Cloud(np.concatenate(positions), np.concatenate(normals), values)
 
 
 def write(cloud: Cloud, path) -> None:
@@ -28,8 +35,8 @@ def write(cloud: Cloud, path) -> None:
 
 HOLES = {"holes": "it gives places and normals of different rows"}
 
-# As shares of 1, with six digits.
-COLORS_OF_OBJ = same(COLORS)
+# One of 255 is lost where a share of 1 is cut off.
+CUT = {name: within(1.0) for name in COLORS}
 
 CASES = [
     Case(
@@ -60,9 +67,21 @@ CASES = [
         extension=".obj",
         read=read,
         write=write,
-        reads=Kept(normals=None, values=COLORS_OF_OBJ, remark="gives no normals to vertices without faces"),
-        writes=Kept(values=COLORS_OF_OBJ),
-        made=Kept(values=COLORS_OF_OBJ, leaves_out_holes=True),
+        reads=Kept(
+            normals=None, values=CUT, remark="gives no normals to vertices without faces, cuts shares of color off"
+        ),
+        writes=Kept(points=within(1e-15), values=same(COLORS)),
+        made=Kept(values=same(COLORS), leaves_out_holes=True),
         without=HOLES,
+    ),
+    Case(
+        program="pymeshlab",
+        format="E57",
+        extension=".e57",
+        read=read,
+        write=write,
+        reads=Kept(values=same(COLORS), leaves_out_holes=True),
+        writes=Kept(points=FLOAT, values=same(COLORS), leaves_out_holes=True, remark="writes floats"),
+        made=Kept(values=same(COLORS)),
     ),
 ]

@@ -4,29 +4,28 @@ import numpy as np
 from pypcd4 import Encoding, PointCloud
 
 from case import PLY, Case
-from clouds import COLORS, NAMES, Cloud
-from compare import Kept, same, within
+from clouds import COLORS, NAMES, Cloud, of_columns
+from compare import SAME, Kept, within
 
-ALL = same(NAMES)
+NORMAL = ("normal_x", "normal_y", "normal_z")
 
 
 def read(path) -> Cloud:
     """Reads every field; colors are packed in one."""
     cloud = PointCloud.from_path(path)
     columns = {name: np.atleast_1d(cloud.pc_data[name]) for name in cloud.fields}
-    take = lambda *chosen: np.column_stack([columns.pop(name) for name in chosen])
-    positions = take("x", "y", "z").astype(np.float64)
-    normals = take("normal_x", "normal_y", "normal_z") if "normal_x" in columns else None
     if "rgb" in columns:
         packed = columns.pop("rgb").copy().view(np.uint32)
-        columns |= {name: (packed >> shift & 255).astype(np.uint8) for name, shift in zip(COLORS, (16, 8, 0))}
-    return Cloud(positions, normals, columns)
+        columns |= {
+            name: (packed >> shift & 255).astype(np.uint8) for name, shift in zip(COLORS, (16, 8, 0), strict=True)
+        }
+    return of_columns(columns, NORMAL)
 
 
 def write(cloud: Cloud, path, encoding=Encoding.BINARY) -> None:
     """Writes coordinates as double, normals and colors as PCL packs them, and values as they are."""
     columns = {name: cloud.positions[:, axis] for axis, name in enumerate("xyz")}
-    columns |= {name: cloud.normals[:, axis] for axis, name in enumerate(("normal_x", "normal_y", "normal_z"))}
+    columns |= {name: cloud.normals[:, axis] for axis, name in enumerate(NORMAL)}
     columns["rgb"] = PointCloud.encode_rgb([cloud.values[name] for name in COLORS])
     columns |= {name: of for name, of in cloud.values.items() if name not in COLORS}
     arrays = list(columns.values())
@@ -40,7 +39,7 @@ def _case(name: str, encoding: Encoding, writes: Kept) -> Case:
         extension=".pcd",
         read=read,
         write=lambda cloud, path: write(cloud, path, encoding),
-        reads=Kept(values=ALL),
+        reads=Kept(others=SAME),
         writes=writes,
         made=PLY,
     )
@@ -57,6 +56,6 @@ AS_TEXT = Kept(
 
 CASES = [
     _case("text", Encoding.ASCII, AS_TEXT),
-    _case("binary", Encoding.BINARY, Kept(values=ALL)),
-    _case("compressed", Encoding.BINARY_COMPRESSED, Kept(values=ALL)),
+    _case("binary", Encoding.BINARY, Kept(others=SAME)),
+    _case("compressed", Encoding.BINARY_COMPRESSED, Kept(others=SAME)),
 ]
