@@ -285,3 +285,34 @@ fn a_long_journal_is_shortened_to_what_can_be_reached() {
     assert_eq!(&offer.reading.recipe.state(), document.state());
     assert_eq!((offer.n_edits(), offer.n_undone()), (document.n_done(), 0));
 }
+
+#[test]
+fn a_journal_follows_its_scan_to_another_content() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |path: &Path| recipe::read(path).unwrap().recipe.head.scan;
+    let find = |hash| found::find(folder.path(), &scan(hash, "/a scan.ply"), Duration::ZERO);
+    let mut journal = Journal::new(folder.path(), head());
+    // Before the first edit there is nothing to write anew.
+    journal.follow(scan(2, "/a scan.ply"));
+    select(&mut journal, 0..2);
+    let path = journal.path().unwrap();
+    assert_eq!(of(&path).hash, [2; 32]);
+    journal.undo();
+    journal.exported();
+    journal.follow(scan(3, "/a scan.ply"));
+    select(&mut journal, 2..3);
+    // Held, under either content.
+    assert_eq!(find(3).held, [path.clone()]);
+    assert!(found::is_held(&path));
+    // An editor that closes at once writes it anew all the same.
+    drop(journal);
+    assert!(!found::is_held(&path));
+    assert_eq!(of(&path).hash, [3; 32]);
+    assert_eq!(selected(&path), [0, 2]);
+    assert!(find(2).offers.iter().all(|offer| !offer.is_same));
+    let offer = find(3).offers.pop().unwrap();
+    assert!(offer.is_same && offer.n_edits() == 2);
+    let mut journal = Journal::resume(offer);
+    select(&mut journal, 3..4);
+    assert_eq!(selected(&path), [0, 2, 3]);
+}
