@@ -11,7 +11,7 @@ import numpy as np
 from plyfile import PlyData
 
 from clouds import CLOUDS, Cloud, of_columns, write_plain_ply
-from compare import FLOAT, SHORTEST, Kept, Outcome, compare
+from compare import FLOAT, SHORTEST, Kept, Outcome, compare, within
 
 NORMEND = os.environ.get("NORMEND", "normend")
 
@@ -94,6 +94,9 @@ class Case:
     # The file that Normend starts from, if it is no binary PLY, and its extension.
     write_source: Callable[[Cloud, Path], None] = write_plain_ply
     source_extension: str = ".ply"
+    # Whether there is such a file of this kind, and whether that has normals.
+    is_made: bool = True
+    is_made_with_normals: bool = True
     # What else is the same in its file and in our export of that, in words, and how to tell: faults of the two files.
     untouched: tuple[str, Callable[[Path, Path], list[str]]] | None = None
     # Columns as Normend reads them in its files, made to the values of the cloud.
@@ -107,8 +110,12 @@ class Case:
 
     def _they_read_ours(self, cloud: Cloud, folder: Path) -> Outcome:
         source, ours = folder / f"source{self.source_extension}", folder / f"ours{self.extension}"
-        self.write_source(cloud, source)
-        export(source, ours)
+        if self.is_made_with_normals:
+            self.write_source(cloud, source)
+            export(source, ours)
+        else:
+            self.write_source(replace(cloud, normals=None), source)
+            convert(source, ours)
         return compare(cloud, self.read(ours), [self.made, self.reads])
 
     def _we_read_theirs(self, cloud: Cloud, folder: Path) -> Outcome:
@@ -131,12 +138,21 @@ class Case:
         export(theirs, ours)
         if self.untouched and (faults := self.untouched[1](theirs, ours)):
             raise ValueError("; ".join(faults))
-        return compare(cloud, self.read(ours), [self.writes, self.reads])
+        got = self.read(ours)
+        outcome = compare(cloud, got, [self.writes, self.reads])
+        if self.writes.normals is None and self.reads.normals is not None:
+            # Its file has none, so ours has those of Normend, which are the same as text.
+            table = folder / "table.csv"
+            export(theirs, table)
+            outcome.normals = compare(
+                read_table(table, ","), got, [Kept(points=self.writes.points, normals=TURNED)]
+            ).normals
+        return outcome
 
     def rows(self, folder: Path) -> list[Row]:
         """A row for each way."""
         rows = []
-        if self.read:
+        if self.read and self.is_made:
             without = self.without | self.without_made
             rows.append(self._row("we write, it reads", self._they_read_ours, [self.reads], without, folder))
         if self.write:
@@ -177,6 +193,8 @@ class Case:
 # What comes through text and through a PLY that Normend makes of another format: all.
 TEXT = Kept(points=SHORTEST, normals=SHORTEST, others=SHORTEST)
 PLY = Kept(normals=FLOAT, others=SHORTEST)
+# Normals that are turned with a scan, and back.
+TURNED = within(1e-6)
 
 
 def version_of(program: str) -> str:

@@ -53,6 +53,8 @@ class Kept:
     others: Held | None = None
     # Rows without a place are left out.
     leaves_out_holes: bool = False
+    # They keep no coordinate at all.
+    blanks_holes: bool = False
     # What it cannot do, for the table.
     remark: str = ""
 
@@ -66,7 +68,15 @@ class Kept:
             cloud = cloud.finite()
         normals = None if self.normals is None or cloud.normals is None else self.normals.of(cloud.normals)
         values = {name: held.of(of) for name, of in cloud.values.items() if (held := self.value(name))}
-        return Cloud(np.asarray(self.points.of(cloud.positions), np.float64), normals, values)
+        positions = np.array(self.points.of(cloud.positions), np.float64)
+        if self.blanks_holes:
+            positions = blanked(positions)
+        return Cloud(positions, normals, values)
+
+
+def blanked(positions):
+    """Positions without the remains of rows that have no place."""
+    return np.where(np.isfinite(positions).all(axis=1, keepdims=True), positions, np.nan)
 
 
 def same(names) -> dict[str, Held]:
@@ -176,7 +186,8 @@ def compare(original: Cloud, got: Cloud, programs: list[Kept]) -> Outcome:
     if len(expected) != len(original):
         original = original.finite()
     held = [kept.points for kept in programs]
-    points = measure("points", original.positions, expected.positions, got.positions, held)
+    given = blanked(original.positions) if any(kept.blanks_holes for kept in programs) else original.positions
+    points = measure("points", given, expected.positions, got.positions, held)
     normals = None
     if expected.normals is not None:
         held = [kept.normals for kept in programs]

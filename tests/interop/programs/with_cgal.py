@@ -51,11 +51,11 @@ CASES = [
     ),
     Case(
         program="CGAL",
-        format="LAS 1.2, format 3",
+        format="LAS",
         extension=".las",
         read=read,
         write=write_las,
-        reads=Kept(normals=None, remark="by LASlib; normals are not asked for"),
+        reads=Kept(normals=None, remark="by LASlib, without normals"),
         writes=Kept(points=within(1e-6), normals=None, leaves_out_holes=True, remark="by LASlib, without normals"),
         made=Kept(points=within(0.0005), leaves_out_holes=True),
         without={"one point": "it writes a scale of 0, which is refused"},

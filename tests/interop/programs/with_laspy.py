@@ -79,19 +79,29 @@ WIDE = Held(factor=257)
 UNTOUCHED = ("whole numbers, scale, offset, records", untouched)
 
 
-def _case(program: str, name: str, extension: str, version: str, point_format: int, backend=None) -> Case:
-    theirs = Kept(points=STEPS, values=same(held(point_format)), leaves_out_holes=True)
+def _ours(program: str, name: str, extension: str, backend=None) -> Case:
     # Colors of LAS have 16 bits.
-    made = Kept(points=STEPS, values=theirs.values | dict.fromkeys(COLORS, WIDE), leaves_out_holes=True)
+    values = same(NAMES) | dict.fromkeys(COLORS, WIDE)
     return Case(
         program=program,
         format=name,
         extension=extension,
         read=lambda path: read(path, backend),
+        reads=Kept(values=same(NAMES)),
+        made=Kept(points=STEPS, values=values, leaves_out_holes=True),
+    )
+
+
+def _theirs(program: str, name: str, extension: str, version: str, point_format: int, backend=None) -> Case:
+    return Case(
+        program=program,
+        format=f"{name} {version}, format {point_format}",
+        extension=extension,
+        read=lambda path: read(path, backend),
         write=lambda cloud, path: write(cloud, path, version, point_format, backend),
         reads=Kept(values=same(NAMES)),
-        writes=theirs,
-        made=made,
+        writes=Kept(points=STEPS, values=same(held(point_format)), leaves_out_holes=True),
+        is_made=False,
         untouched=UNTOUCHED,
     )
 
@@ -99,12 +109,15 @@ def _case(program: str, name: str, extension: str, version: str, point_format: i
 LAZRS, LASZIP = laspy.LazBackend.LazrsParallel, laspy.LazBackend.Laszip
 
 CASES = [
-    _case("laspy", "LAS 1.2, format 0", ".las", "1.2", 0),
-    _case("laspy", "LAS 1.2, format 3", ".las", "1.2", 3),
-    _case("laspy", "LAS 1.4, format 7", ".las", "1.4", 7),
-    _case("laspy", "LAS 1.4, format 8", ".las", "1.4", 8),
-    _case("lazrs", "LAZ 1.2, format 3", ".laz", "1.2", 3, LAZRS),
-    _case("lazrs", "LAZ 1.4, format 7", ".laz", "1.4", 7, LAZRS),
-    _case("laszip", "LAZ 1.2, format 3", ".laz", "1.2", 3, LASZIP),
-    _case("laszip", "LAZ 1.4, format 7", ".laz", "1.4", 7, LASZIP),
+    _ours("laspy", "LAS", ".las"),
+    _theirs("laspy", "LAS", ".las", "1.2", 0),
+    _theirs("laspy", "LAS", ".las", "1.2", 3),
+    _theirs("laspy", "LAS", ".las", "1.4", 7),
+    _theirs("laspy", "LAS", ".las", "1.4", 8),
+    _ours("lazrs", "LAZ", ".laz", LAZRS),
+    _theirs("lazrs", "LAZ", ".laz", "1.2", 3, LAZRS),
+    _theirs("lazrs", "LAZ", ".laz", "1.4", 7, LAZRS),
+    _ours("laszip", "LAZ", ".laz", LASZIP),
+    _theirs("laszip", "LAZ", ".laz", "1.2", 3, LASZIP),
+    _theirs("laszip", "LAZ", ".laz", "1.4", 7, LASZIP),
 ]

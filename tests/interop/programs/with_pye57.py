@@ -75,6 +75,6 @@ CASES = [
             leaves_out_holes=True,
             remark="writes floats about the scanner, no normals",
         ),
-        made=Kept(values=VALUES),
+        made=Kept(values=VALUES, blanks_holes=True),
     ),
 ]
