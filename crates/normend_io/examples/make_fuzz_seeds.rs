@@ -12,7 +12,7 @@ use glam::Vec3;
 use normend_core::document::FlipReason;
 use normend_core::{Document, Edit, Parameters, PointSet, Preset, Propagation, Silent, shapes};
 use normend_io::recipe::{Event, Head, Recipe};
-use normend_io::{Positions, Scan, read_bytes, write_points};
+use normend_io::{Positions, Scan, WriteOptions, read_bytes, write_points};
 
 /// Points of the generated scans.
 const N_POINTS: usize = 24;
@@ -24,6 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .map_or_else(|| PathBuf::from(bundled), PathBuf::from);
     ply(&root.join("ply"))?;
     text(&root.join("text"))?;
+    packed(&root)?;
     sensors(&root.join("sensors"))?;
     recipes(&root.join("recipe"), &root.join("journal"))?;
     settings(&root.join("settings"), &root.join("keymap"))?;
@@ -86,6 +87,53 @@ fn ply(folder: &Path) -> Result<(), Box<dyn Error>> {
         splats.extend_from_slice(&(value as f32).to_le_bytes());
     }
     put(folder, "splats.ply", splats)
+}
+
+/// The formats whose files are made from others: a plain one, one with all that a point may have, one with several scans.
+fn packed(root: &Path) -> Result<(), Box<dyn Error>> {
+    let rich = "x,y,z,intensity,red,green,blue,classification,gps_time,word\n\
+        500000.123,4500000.456,7.5,0.25,1,2,3,2,1000.5,a\n500001,4500000.5,8,0.5,255,255,0,6,1000.75,b\n\
+        500001.5,4500001.25,8.125,1,0,0,9,6,1001,c\n";
+    let rich = read_bytes(rich.into(), "rich.csv", &Silent)?;
+    let cell = |x: f32, y: f32| format!("{x} {y} 1 0.5 255 0 10\n");
+    let grid = |place: f32| {
+        format!(
+            "2\n2\n{place} 0 1\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n{place} 0 1 1\n{}{}0 0 0 0.5 0 0 0\n{}",
+            cell(1.0, 1.0),
+            cell(-1.0, 2.0),
+            cell(0.5, -2.0)
+        )
+    };
+    let grids = grid(0.0) + &grid(10.5);
+    put(&root.join("ptx"), "grids.ptx", &grids)?;
+    let grids = read_bytes(grids.into(), "grids.ptx", &Silent)?;
+    for extension in ["las", "laz", "pcd", "ptx", "e57"] {
+        let folder = root.join(extension);
+        written(&folder, &format!("plain.{extension}"), false)?;
+        for (name, scan) in [("rich", &rich), ("grids", &grids)] {
+            let path = folder.join(format!("{name}_normals.{extension}"));
+            let normals = vec![Vec3::Z; scan.cloud.n_points()];
+            scan.write(&normals, &path, &WriteOptions::default(), &Silent)?;
+        }
+    }
+    let pcd = |data: &str, points: &[u8]| {
+        let head = format!(
+            "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\n\
+             VIEWPOINT 1 2 3 1 0 0 0\nPOINTS 2\nDATA {data}\n"
+        );
+        [head.as_bytes(), points].concat()
+    };
+    put(
+        &root.join("pcd"),
+        "ascii.pcd",
+        pcd("ascii", b"1 2 3 255\nnan 2.5 -3 65280\n"),
+    )?;
+    // One literal run of all 32 bytes, columns after columns.
+    let mut points = [33_u32.to_le_bytes(), 32_u32.to_le_bytes()].concat();
+    points.push(31);
+    points.extend((0..8).flat_map(|value| (value as f32).to_le_bytes()));
+    put(&root.join("pcd"), "packed.pcd", pcd("binary_compressed", &points))?;
+    Ok(())
 }
 
 fn text(folder: &Path) -> Result<(), Box<dyn Error>> {

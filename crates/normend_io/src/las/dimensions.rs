@@ -225,6 +225,9 @@ fn value_type(description: &[u8], scalar: Scalar, value: usize) -> ValueType {
     ValueType::Scaled(scalar, scaling)
 }
 
+/// How far a component of a normal may be off where it is a number of steps: those of a byte with a sign are this large.
+const COARSEST_SHARE: f64 = 1.0 / 127.0;
+
 /// The fields that are coordinates, normal, confidence and its flag, by slot. `extra` are the fields from `first_extra` on.
 pub(crate) fn chosen(fields: &[RecordField], first_extra: usize) -> [Option<usize>; N_VALUES] {
     let mut chosen = [None; N_VALUES];
@@ -241,7 +244,13 @@ pub(crate) fn chosen(fields: &[RecordField], first_extra: usize) -> [Option<usiz
     // Whole numbers hold no unit vector, unless they are steps of something smaller.
     let holds_shares = |value_type: ValueType| match value_type {
         ValueType::LittleEndian(scalar) => scalar.is_float(),
-        ValueType::Scaled(..) => true,
+        // Of any size and from any number on: only where both ends and the middle come back.
+        ValueType::Scaled(..) => [-1.0, 0.0, 0.6, 1.0].into_iter().all(|share: f32| {
+            let mut bytes = Vec::new();
+            value_type.write(share, &mut bytes);
+            let is_near = |read: f64| (read - f64::from(share)).abs() <= COARSEST_SHARE;
+            value_type.read(&bytes).is_some_and(is_near)
+        }),
         _ => false,
     };
     for way in 0..NORMAL_NAMES[0].len() {
