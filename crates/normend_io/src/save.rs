@@ -337,7 +337,7 @@ fn kept_mode(former: u32, has_owner: bool, has_group: bool) -> u32 {
     }
     if !has_group {
         // The group is another one: it may what all may.
-        mode = mode & !0o2070 | (mode & 0o007) << 3 & (mode & 0o070);
+        mode = (mode & !0o2070) | (((mode & 0o007) << 3) & (mode & 0o070));
     }
     mode
 }
