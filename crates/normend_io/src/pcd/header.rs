@@ -133,9 +133,14 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Header, Broken> {
         Ok(meta) => meta,
         Err(error) => return Err(why_not(bytes, &entries, &error)),
     };
-    let names = entries.iter().find(|entry| matches!(entry.keyword, "FIELDS" | "COLUMNS"));
+    let names = entries
+        .iter()
+        .find(|entry| matches!(entry.keyword, "FIELDS" | "COLUMNS"));
     let names = names.map_or(&[][..], |entry| &entry.words);
-    let n_values = meta.field_defs.iter().try_fold(0_u64, |sum, field| sum.checked_add(field.count));
+    let n_values = meta
+        .field_defs
+        .iter()
+        .try_fold(0_u64, |sum, field| sum.checked_add(field.count));
     if n_values.is_none_or(|n_values| n_values > MOST_VALUES as u64) {
         return Err(Broken::whole(format!(
             "a point has more than {MOST_VALUES} numbers: export the file with fewer"
@@ -149,8 +154,10 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Header, Broken> {
     let viewpoint = &meta.viewpoint;
     let place = DVec3::new(viewpoint.tx, viewpoint.ty, viewpoint.tz);
     // What is written when nothing is known of the scanner: no shift, no rotation.
-    let is_unknown =
-        place == DVec3::ZERO && [viewpoint.qx, viewpoint.qy, viewpoint.qz].iter().all(|component| *component == 0.0);
+    let is_unknown = place == DVec3::ZERO
+        && [viewpoint.qx, viewpoint.qy, viewpoint.qz]
+            .iter()
+            .all(|component| *component == 0.0);
     Ok(Header {
         data: meta.data,
         fields: fields.collect(),
@@ -252,7 +259,9 @@ fn why_not(bytes: &[u8], entries: &[Entry], error: &pcd_rs::Error) -> Broken {
         }
     }
     if find("POINTS").is_none() && find("WIDTH").is_none() {
-        return Broken::whole("the header has no line POINTS, which says how many points there are: export the file again");
+        return Broken::whole(
+            "the header has no line POINTS, which says how many points there are: export the file again",
+        );
     }
     for entry in entries {
         let words = entry.words.iter().map(|word| word.of(bytes));
@@ -274,10 +283,20 @@ fn why_not(bytes: &[u8], entries: &[Entry], error: &pcd_rs::Error) -> Broken {
                 )
             }
             "SIZE" if !words.clone().all(|word| matches!(word, b"1" | b"2" | b"4" | b"8")) => {
-                format!("SIZE is {}, but numbers of PCD take 1, 2, 4 or 8 bytes: correct it", shown())
+                format!(
+                    "SIZE is {}, but numbers of PCD take 1, 2, 4 or 8 bytes: correct it",
+                    shown()
+                )
             }
-            "TYPE" if !words.clone().all(|word| matches!(word, b"I" | b"U" | b"F" | b"i" | b"u" | b"f")) => {
-                format!("TYPE is {}, but numbers of PCD are of type I, U or F: correct it", shown())
+            "TYPE"
+                if !words
+                    .clone()
+                    .all(|word| matches!(word, b"I" | b"U" | b"F" | b"i" | b"u" | b"f")) =>
+            {
+                format!(
+                    "TYPE is {}, but numbers of PCD are of type I, U or F: correct it",
+                    shown()
+                )
             }
             "COUNT" | "WIDTH" | "HEIGHT" | "POINTS" if !words.clone().all(is_count) => {
                 format!("{} is {}, not whole numbers: correct it", entry.keyword, shown())
@@ -285,10 +304,20 @@ fn why_not(bytes: &[u8], entries: &[Entry], error: &pcd_rs::Error) -> Broken {
             "VIEWPOINT" if !words.clone().all(|word| crate::value::parse(word).is_some()) => {
                 format!("VIEWPOINT is {}, not seven numbers: correct it", shown())
             }
-            "VERSION" if !words.clone().all(|word| matches!(word, b".7" | b"0.7" | b".6" | b"0.6" | b".5" | b"0.5")) => {
-                format!("VERSION is {}, but Normend reads .5, .6 and .7: export the file as .7", shown())
+            "VERSION"
+                if !words
+                    .clone()
+                    .all(|word| matches!(word, b".7" | b"0.7" | b".6" | b"0.6" | b".5" | b"0.5")) =>
+            {
+                format!(
+                    "VERSION is {}, but Normend reads .5, .6 and .7: export the file as .7",
+                    shown()
+                )
             }
-            "DATA" => format!("DATA is {}, but should be ascii, binary or binary_compressed: correct it", shown()),
+            "DATA" => format!(
+                "DATA is {}, but should be ascii, binary or binary_compressed: correct it",
+                shown()
+            ),
             _ => continue,
         };
         // A header of the right shape whose DATA is right too has a fault that only `pcd_rs` knows.
@@ -338,7 +367,10 @@ impl Header {
         let at = |at: usize| Span { start: at, end: at };
         match self.own_comment {
             Some(span) => edits.push((span, format!("# {comment}").into_bytes())),
-            None => edits.push((at(self.after_first_line), format!("# {comment}{}", self.line_end).into_bytes())),
+            None => edits.push((
+                at(self.after_first_line),
+                format!("# {comment}{}", self.line_end).into_bytes(),
+            )),
         }
         for entry in &self.entries {
             // How the value of a field is written in this line.

@@ -190,7 +190,9 @@ mod tests {
         check(&[7; 1_000_000], 3 * (1_000_000 / 264 + 2));
         // The beginning is repeated after exactly, and after a little more than, what a repetition can reach.
         for (distance, is_reached) in [(WINDOW, true), (WINDOW + 1, false)] {
-            let mut bytes: Vec<u8> = (0..distance as u32).flat_map(|index| (index * index).to_le_bytes()).collect();
+            let mut bytes: Vec<u8> = (0..distance as u32)
+                .flat_map(|index| (index * index).to_le_bytes())
+                .collect();
             bytes.truncate(distance);
             bytes[..4].copy_from_slice(&[250, 251, 252, 253]);
             bytes.extend([250, 251, 252, 253]);

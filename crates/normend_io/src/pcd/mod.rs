@@ -41,6 +41,10 @@ const PCL_NORMAL: [&str; 3] = ["normal_x", "normal_y", "normal_z"];
 const PACKED_COLORS: [&str; 2] = ["rgb", "rgba"];
 /// The bytes of such a number, from the lowest on.
 const CHANNELS: [&str; 4] = ["blue", "green", "red", "alpha"];
+/// How many times smaller than its rows a packed file may be, besides some bytes that any may have. LZF packs up to 88 times, but
+/// that takes coordinates that hardly differ; a grid of which nine in ten cells are empty comes to 12.
+const MOST_REPEATED: usize = 32;
+const LEAST_ALLOWED: usize = 8 << 20;
 /// Bytes of columns that are packed together.
 const PIECE: usize = 1 << 20;
 
@@ -105,7 +109,9 @@ fn read_text(bytes: &[u8], header: Header, progress: &dyn Progress) -> Result<Pc
     if let Some(more) = next_word(bytes, end) {
         return Err(Broken::new(
             line_of(bytes, more),
-            format!("{n_rows} points are announced, but more lines follow: correct POINTS and WIDTH, or remove the lines"),
+            format!(
+                "{n_rows} points are announced, but more lines follow: correct POINTS and WIDTH, or remove the lines"
+            ),
         )
         .into());
     }
@@ -122,7 +128,9 @@ fn unpack(bytes: &[u8], header: Header, progress: &dyn Progress) -> Result<Pcd, 
         Some(u32::from_le_bytes(bytes) as usize)
     };
     let first = head + 8;
-    let sizes = size(0).zip(size(4)).filter(|(n_packed, _)| *n_packed <= bytes.len() - first);
+    let sizes = size(0)
+        .zip(size(4))
+        .filter(|(n_packed, _)| *n_packed <= bytes.len() - first);
     let Some((n_packed, n_unpacked)) = sizes else {
         return Err(Broken::new(
             Place::Byte(head),
@@ -136,7 +144,9 @@ fn unpack(bytes: &[u8], header: Header, progress: &dyn Progress) -> Result<Pcd, 
     let Some(layout) = layouts.into_iter().find(fits) else {
         return Err(Broken::new(
             Place::Byte(head + 4),
-            format!("{n_rows} points do not have the {n_unpacked} bytes that are said to be packed: export the file again"),
+            format!(
+                "{n_rows} points do not have the {n_unpacked} bytes that are said to be packed: export the file again"
+            ),
         )
         .into());
     };
@@ -146,6 +156,16 @@ fn unpack(bytes: &[u8], header: Header, progress: &dyn Progress) -> Result<Pcd, 
         return Err(Broken::new(
             Place::Byte(head + 4),
             "the packed points are not as many as announced: the file is damaged, copy or export it again",
+        )
+        .into());
+    }
+    if n_unpacked > MOST_REPEATED * n_packed + LEAST_ALLOWED {
+        return Err(Broken::new(
+            Place::Byte(head + 4),
+            format!(
+                "the packed points unpack to more than {MOST_REPEATED} times their size, as those of no scan do: export the file \
+                 as binary"
+            ),
         )
         .into());
     }
@@ -333,7 +353,11 @@ fn chosen_fields(header: &Header, fields: &[RecordField]) -> Result<[Option<usiz
         names.into_iter().any(|normal| normal.eq_ignore_ascii_case(name))
     };
     let is_value = |name: &str| is_normal(name) || VALUE_NAMES.iter().any(|value| value.eq_ignore_ascii_case(name));
-    if let Some(field) = header.fields.iter().find(|field| field.count > 1 && is_value(&field.name)) {
+    if let Some(field) = header
+        .fields
+        .iter()
+        .find(|field| field.count > 1 && is_value(&field.name))
+    {
         return Err(Broken::whole(format!(
             "COUNT of \"{}\" is {}, but it is one number: correct the header",
             field.name, field.count
@@ -432,11 +456,15 @@ impl Layout for PcdLayout {
         };
         let n_unpacked = as_size(columns.n_bytes())?;
         let mut plain = Cursor::new(Vec::new());
-        let mut rows = Output {
-            path,
-            file: &mut plain,
-        };
-        rewrite(self, bytes, &edits, content.normals, &mut rows, &Part::new(progress, 0.0..0.4))?;
+        let mut rows = Output { path, file: &mut plain };
+        rewrite(
+            self,
+            bytes,
+            &edits,
+            content.normals,
+            &mut rows,
+            &Part::new(progress, 0.0..0.4),
+        )?;
         let plain = plain.into_inner();
         let n_after = bytes.len() - self.records.table.end;
         let (rows, after) = plain.split_at(plain.len() - n_after);

@@ -21,7 +21,9 @@ pub(crate) fn limit(file: &mut NewFile<'_>) -> Vec<Loss> {
         is_text.then(|| "PCD holds numbers only".to_owned())
     });
     if let Some(colors) = colors_of(file)
-        && colors.iter().any(|&field| !is_byte(&file.fields[field]) && file.fields[field].kind != ColumnKind::Decimal)
+        && colors
+            .iter()
+            .any(|&field| !is_byte(&file.fields[field]) && file.fields[field].kind != ColumnKind::Decimal)
     {
         let names = colors.map(|field| file.fields[field].name.as_str());
         losses.push(Loss {
@@ -103,7 +105,10 @@ fn plan(file: &NewFile<'_>, may_round: bool, progress: &dyn Progress) -> Result<
         white = scale.white;
         if scale.is_exact || may_round {
             packed = vec![blue, green, red];
-            let alpha = file.fields.iter().position(|field| field.name.eq_ignore_ascii_case(CHANNELS[3]) && is_byte(field));
+            let alpha = file
+                .fields
+                .iter()
+                .position(|field| field.name.eq_ignore_ascii_case(CHANNELS[3]) && is_byte(field));
             packed.extend(alpha.filter(|_| white == 255.0));
         }
     }
@@ -117,13 +122,17 @@ fn plan(file: &NewFile<'_>, may_round: bool, progress: &dyn Progress) -> Result<
     Ok(Plan {
         packed,
         white,
-        others: others.map(|((index, field), name)| (index, scalar(&field), name)).collect(),
+        others: others
+            .map(|((index, field), name)| (index, scalar(&field), name))
+            .collect(),
     })
 }
 
 /// A field under the name by which PCL finds it.
 fn renamed(field: &Field) -> Field {
-    let is_intensity = ["intensity", "scalar_intensity"].iter().any(|name| field.name.eq_ignore_ascii_case(name));
+    let is_intensity = ["intensity", "scalar_intensity"]
+        .iter()
+        .any(|name| field.name.eq_ignore_ascii_case(name));
     let mut field = field.clone();
     if is_intensity {
         field.name = "intensity".to_owned();
@@ -148,7 +157,10 @@ fn head(file: &NewFile<'_>, coordinates: Scalar, plan: &Plan) -> String {
         fields.extend(NORMAL.map(|slot| (PCL_NORMAL[slot - NORMAL.start], Scalar::Float)));
     }
     if file.has_confidence() {
-        fields.extend([(VALUE_NAMES[SIDE.start], Scalar::Float), (VALUE_NAMES[SIDE.start + 1], Scalar::UChar)]);
+        fields.extend([
+            (VALUE_NAMES[SIDE.start], Scalar::Float),
+            (VALUE_NAMES[SIDE.start + 1], Scalar::UChar),
+        ]);
     }
     match plan.packed.len() {
         0 => {}
@@ -171,7 +183,9 @@ fn head(file: &NewFile<'_>, coordinates: Scalar, plan: &Plan) -> String {
         "# .PCD v0.7 - Point Cloud Data file format\n".to_owned(),
         file.comment.map(|comment| format!("# {comment}\n")).unwrap_or_default(),
         match coordinates {
-            Scalar::Double => "# x y z are of 8 bytes, because 4 would lose digits; PCL itself reads 4 only\n".to_owned(),
+            Scalar::Double => {
+                "# x y z are of 8 bytes, because 4 would lose digits; PCL itself reads 4 only\n".to_owned()
+            }
             _ => String::new(),
         },
         "VERSION 0.7\n".to_owned(),

@@ -54,7 +54,9 @@ impl Rows for TextRows<'_> {
             let (n_expected, noun) = (self.n_words, if n_words == 1 { "value" } else { "values" });
             return Err(Broken::new(
                 line_of(self.bytes, first.start),
-                format!("{shown} has {n_words} {noun}, but FIELDS and COUNT announce {n_expected} for each point: correct the line"),
+                format!(
+                    "{shown} has {n_words} {noun}, but FIELDS and COUNT announce {n_expected} for each point: correct the line"
+                ),
             ));
         }
         Ok(Some(spans))
