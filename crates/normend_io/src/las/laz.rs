@@ -33,8 +33,8 @@ const STEP_ROWS: usize = 1 << 14;
 pub(crate) const MOST_EXTRA: usize = 1024;
 /// What any file may unpack to, in bytes.
 const FREE_BYTES: usize = 16 << 20;
-/// How many times its size a file may unpack to beyond that. Surveys are packed to a tenth, regular grids to a hundredth.
-const MOST_TIMES: usize = 400;
+/// How many times the bytes of its points a file may unpack to besides. Surveys are packed to a tenth or so.
+const MOST_TIMES: usize = 100;
 
 /// How the points of a file are packed.
 #[derive(Clone, Debug)]
@@ -81,7 +81,7 @@ pub(crate) fn unpack(bytes: &[u8], head: &Head, progress: &dyn Progress) -> Resu
     let has_chunks = record.first() != Some(&(CompressorType::PointWise as u8));
     let n_total = head.n_points.saturating_mul(head.stride);
     let n_packed = head.rest_at - head.points_at;
-    if n_total > FREE_BYTES && n_total / MOST_TIMES > n_packed {
+    if n_total > FREE_BYTES.saturating_add(n_packed.saturating_mul(MOST_TIMES)) {
         return Err(Broken::new(
             Place::Byte(head.points_at),
             format!(
