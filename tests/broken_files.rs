@@ -50,7 +50,7 @@ fn what_is_no_point_cloud() {
     check_named(
         "scan.las",
         b"LASF\0\0\0",
-        ": this is a LAS or LAZ file, which Normend does not read: convert it to PLY",
+        ", byte 7: the file ends inside its header: copy it again",
     );
     check_named(
         "scan.bin",
