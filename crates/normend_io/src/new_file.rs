@@ -192,6 +192,14 @@ impl<'a> NewFile<'a> {
         }
     }
 
+    /// How many rows a column of each frame has, when frames are grids that are stored column by column; else empty.
+    pub fn grid_heights(&self) -> &[usize] {
+        match self.origin {
+            Origin::Positions(_) => &[],
+            Origin::File { layout, .. } => layout.grid_heights(),
+        }
+    }
+
     /// Whether confidence is written.
     pub fn has_confidence(&self) -> bool {
         self.normals.is_some_and(RowNormals::has_confidence)

@@ -238,6 +238,11 @@ pub(crate) trait Layout: Send + Sync {
         true
     }
 
+    /// How many rows a column of each frame has, when frames are grids that are stored column by column; empty when they are not.
+    fn grid_heights(&self) -> &[usize] {
+        &[]
+    }
+
     /// Whether this byte separates values in text.
     fn is_separator(&self, byte: u8) -> bool {
         is_space(byte)

@@ -11,6 +11,8 @@ mod pages;
 mod rewrite;
 mod rows;
 mod sections;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -51,6 +53,8 @@ struct Source {
 /// Unpacks a file; returns the rows and what they are.
 pub(crate) fn read(mut bytes: Vec<u8>, progress: &dyn Progress) -> Result<(Vec<u8>, E57Layout), Stop> {
     pages::check_header(&bytes)?;
+    pages::check_pages(&bytes)?;
+    progress.report(0.05)?;
     let n_bytes = bytes.len();
     let Metadata {
         xml,
@@ -59,8 +63,7 @@ pub(crate) fn read(mut bytes: Vec<u8>, progress: &dyn Progress) -> Result<(Vec<u
         n_images,
         has_coordinate_system,
     } = metadata::read(&bytes)?;
-    progress.report(0.05)?;
-    pages::strip(&mut bytes)?;
+    pages::strip(&mut bytes);
     progress.report(0.1)?;
 
     let content = &bytes[..];

@@ -6,9 +6,9 @@ use std::io;
 use e57::{E57Writer, Extension, Quaternion, RawValues, Record, RecordDataType, RecordName, RecordValue};
 use e57::{Transform, Translation};
 use glam::{DQuat, DVec3, Vec3};
-use normend_core::Progress;
 use normend_core::confidence::UNDECIDED;
 use normend_core::progress::Part;
+use normend_core::{PointCloud, Progress};
 use rayon::prelude::*;
 
 use super::metadata::{NORMALS_URI, OWN_URI};
@@ -17,11 +17,14 @@ use crate::error::{Stop, WriteError};
 use crate::new_file::{Cell, Loss, NewFile, NewRow, Pose, plain_names};
 use crate::output::Output;
 use crate::rewrite::share_of;
-use crate::table::{Frame, PART_ROWS, VALUE_NAMES};
+use crate::table::{Frame, PART_ROWS, SIDE, VALUE_NAMES};
 use crate::value::Scalar;
 
 /// The most values besides place and normal: rows of more do not fit into packets.
 const MOST_FIELDS: usize = 800;
+
+/// Whole numbers go from the opposite of this on, up to it: the crate subtracts them without room for more.
+const WIDEST: i64 = 1 << 62;
 
 /// Drops what E57 cannot hold.
 pub(crate) fn limit(file: &mut NewFile<'_>) -> Vec<Loss> {
@@ -142,7 +145,7 @@ fn field_type(kind: ColumnKind, (min, max): (f64, f64)) -> RecordDataType {
         ColumnKind::Number(Scalar::UShort) => whole(0, u16::MAX.into()),
         ColumnKind::Number(Scalar::Int) => whole(i32::MIN.into(), i32::MAX.into()),
         ColumnKind::Number(Scalar::UInt) => whole(0, u32::MAX.into()),
-        ColumnKind::Number(Scalar::Long | Scalar::ULong) => whole(i64::MIN, i64::MAX),
+        ColumnKind::Number(Scalar::Long | Scalar::ULong) => whole(-WIDEST, WIDEST - 1),
         ColumnKind::Number(Scalar::Float) => RecordDataType::Single {
             min: is_known.then_some(min as f32),
             max: is_known.then_some(max as f32),
@@ -178,6 +181,12 @@ impl<'a> Rows<'a> {
         let mut add = |name, data_type| prototype.push(Record { name, data_type });
         if ranges.has_gaps {
             add(RecordName::CartesianInvalidState, whole(0, 2));
+        }
+        // Cells of grids are counted as E57 counts them.
+        if !file.grid_heights().is_empty() {
+            let last = PointCloud::MAX_POINTS as i64;
+            add(RecordName::RowIndex, whole(0, last));
+            add(RecordName::ColumnIndex, whole(0, last));
         }
         let share = |min| RecordDataType::Single {
             min: Some(min),
@@ -223,9 +232,9 @@ impl<'a> Rows<'a> {
         end - self.frames[frame].0.first_row
     }
 
-    fn frame_of(&self, row: usize) -> &(Frame, Option<Pose>) {
+    fn frame_of(&self, row: usize) -> usize {
         let next = self.frames.partition_point(|(frame, _)| frame.first_row <= row);
-        &self.frames[next.saturating_sub(1)]
+        next.saturating_sub(1)
     }
 
     /// The values of the rows of a part, in the order of the prototype.
@@ -234,14 +243,15 @@ impl<'a> Rows<'a> {
         let mut rows = Vec::with_capacity(range.len());
         let mut row_index = range.start;
         self.file.for_rows(range, |row| {
-            let (frame, pose) = self.frame_of(row_index);
-            rows.push(self.values(row, frame, pose.as_ref()));
+            rows.push(self.values(row, row_index));
             row_index += 1;
         })?;
         Ok(rows)
     }
 
-    fn values(&self, row: &NewRow<'_>, frame: &Frame, pose: Option<&Pose>) -> RawValues {
+    fn values(&self, row: &NewRow<'_>, row_index: usize) -> RawValues {
+        let frame_index = self.frame_of(row_index);
+        let (frame, pose) = &self.frames[frame_index];
         let mut values = RawValues::with_capacity(self.prototype.len());
         let is_point = row.position.is_finite();
         let own = match (is_point, pose) {
@@ -255,6 +265,12 @@ impl<'a> Rows<'a> {
         }));
         if self.has_gaps {
             values.push(RecordValue::Integer(if is_point { 0 } else { 2 }));
+        }
+        if let Some(&height) = self.file.grid_heights().get(frame_index) {
+            let cell = row_index - frame.first_row;
+            let height = height.max(1);
+            values.push(RecordValue::Integer((cell % height) as i64));
+            values.push(RecordValue::Integer((cell / height) as i64));
         }
         if let Some(normal) = row.normal {
             let normal = match pose {
@@ -331,7 +347,8 @@ fn field_names(file: &NewFile<'_>) -> Vec<RecordName> {
     let returns = both(["returnIndex", "returnCount"]);
     let time = file.fields.iter().position(|field| field.name == "timeStamp");
     // A name in XML begins with a letter.
-    let plain = plain_names(&file.fields, &VALUE_NAMES);
+    let taken = if file.has_confidence() { SIDE.end } else { SIDE.start };
+    let plain = plain_names(&file.fields, &VALUE_NAMES[..taken]);
     plain
         .into_iter()
         .enumerate()

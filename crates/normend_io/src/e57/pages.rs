@@ -75,8 +75,8 @@ fn logical_size(physical: usize) -> usize {
     physical / PAGE * PAYLOAD
 }
 
-/// Checks all pages in parallel and takes their checksums out, in place. The size is a multiple of a page's.
-pub(super) fn strip(bytes: &mut Vec<u8>) -> Result<(), Broken> {
+/// Compares all pages with their checksums, in parallel. The size is a multiple of a page's.
+pub(super) fn check_pages(bytes: &[u8]) -> Result<(), Broken> {
     let is_damaged = |page: &[u8]| crc32c::crc32c(&page[..PAYLOAD]).to_be_bytes() != page[PAYLOAD..];
     let blocks = bytes.par_chunks(PAGE * PAGES_TOGETHER).enumerate();
     let damaged = blocks.filter_map(|(block, pages)| {
@@ -92,12 +92,16 @@ pub(super) fn strip(bytes: &mut Vec<u8>) -> Result<(), Broken> {
             ),
         ));
     }
+    Ok(())
+}
+
+/// Takes the checksums out, in place.
+pub(super) fn strip(bytes: &mut Vec<u8>) {
     let n_pages = bytes.len() / PAGE;
     for page in 1..n_pages {
         bytes.copy_within(page * PAGE..page * PAGE + PAYLOAD, page * PAYLOAD);
     }
     bytes.truncate(n_pages * PAYLOAD);
-    Ok(())
 }
 
 /// Writes a file page by page; the header last.

@@ -145,9 +145,9 @@ pub(super) fn read_streams(
         return Err(Broken::new(
             place(offset),
             format!(
-                "{n_rows} points of {} bits each do not fit into the {} bytes of the file: it is cut off or damaged, export it again",
+                "{n_rows} points of {} bits each do not fit into the {} bytes that are left of the file: it is cut off or damaged, export it again",
                 bits.iter().sum::<usize>(),
-                content.len()
+                budget.0
             ),
         )
         .into());

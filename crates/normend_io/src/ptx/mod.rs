@@ -6,6 +6,8 @@
 //! are three more columns at the end, in the grid's own coordinates, and are told by their length.
 
 pub(crate) mod new;
+#[cfg(test)]
+mod tests;
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use normend_core::{PointCloud, Progress};
@@ -37,6 +39,8 @@ const MOST_VALUES: usize = 1000;
 pub(crate) struct PtxLayout {
     line_end: u8,
     grids: Vec<Grid>,
+    /// How many rows each of them has; empty when they are nothing but lists.
+    heights: Vec<usize>,
     /// The columns of all grids.
     names: Vec<String>,
     /// Which of them each value is, by slot.
@@ -52,6 +56,7 @@ struct Grid {
     /// The byte of its first cell.
     cells: usize,
     n_cells: usize,
+    height: usize,
     /// Which column each value of a line is.
     columns: Vec<usize>,
 }
@@ -82,6 +87,7 @@ pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<PtxLayout, S
     let mut layout = PtxLayout {
         line_end,
         grids: Vec::new(),
+        heights: Vec::new(),
         names: VALUE_NAMES[COORDINATES].iter().map(|&name| name.to_owned()).collect(),
         chosen: [None; N_VALUES],
         table: Table {
@@ -111,6 +117,13 @@ pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<PtxLayout, S
         return Err(Broken::whole("the file has no points: open one that has").into());
     }
     layout.name_columns(bytes, &n_values);
+    if layout
+        .grids
+        .iter()
+        .any(|grid| grid.height > 1 && grid.n_cells > grid.height)
+    {
+        layout.heights = layout.grids.iter().map(|grid| grid.height).collect();
+    }
     let mut rows = PtxRows::new(&layout, bytes, 0);
     let (starts, _, end) = find_parts(&mut rows, layout.table.n_rows, bytes.len(), progress)?;
     layout.table.starts = Starts::Parts(starts);
@@ -283,6 +296,7 @@ impl PtxLayout {
             start,
             cells,
             n_cells,
+            height: rows as usize,
             columns: Vec::new(),
         };
         Ok(Some((grid, frame, n_columns, at.min(bytes.len()))))
@@ -447,6 +461,10 @@ impl Layout for PtxLayout {
             !digits.into_iter().any(|byte| matches!(byte, b'1'..=b'9'))
         };
         !spans[COORDINATES].iter().all(is_zero)
+    }
+
+    fn grid_heights(&self) -> &[usize] {
+        &self.heights
     }
 
     fn columns(&self, _bytes: &[u8]) -> Vec<Column> {
