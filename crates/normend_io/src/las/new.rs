@@ -551,7 +551,7 @@ fn standard_name(name: &str) -> Option<&'static str> {
         "userdata" => "user_data",
         "scanangle" | "scananglerank" => "scan_angle",
         "pointsourceid" => "point_source_id",
-        "gpstime" | "time" => "gps_time",
+        "gpstime" => "gps_time",
         "nir" | "nearinfrared" => "nir",
         _ => return None,
     })
