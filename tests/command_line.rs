@@ -426,11 +426,11 @@ fn wrong_use_is_refused_before_anything_is_written() {
     check("orient a.ply sub/a.ply -o out", &["two inputs", "one by one"]);
     check("orient a.ply -o out.ply --json a.ply", &["--json"]);
     check("orient a.ply -o out.ply --json out.ply", &["--json"]);
-    for name in ["out.obj", "out.las", "out.png"] {
+    for name in ["out.stl", "out.dxf", "out.png"] {
         check(&format!("orient a.ply -o {name}"), &[name, ".ply", ".xyz"]);
         check(&format!("generate sphere -o {name}"), &[name, ".ply", ".xyz"]);
     }
-    check("generate sphere -o out.ply --truth truth.obj", &["truth.obj", ".ply"]);
+    check("generate sphere -o out.ply --truth truth.stl", &["truth.stl", ".ply"]);
     check("orient a.ply -o -", &["standard output", "name of a file"]);
     check("orient a.ply sub/b.ply -o -", &["standard output", "name of a file"]);
     check("generate sphere -o -", &["standard output", "name of a file"]);
@@ -478,7 +478,7 @@ fn wrong_use_is_told_with_the_usage_of_its_command() {
         &["Usage: normend orient [OPTIONS] --output <OUT> <IN>"],
     );
     check("render a.ply -o a.jpg", &["Usage: normend render"]);
-    check("generate torus -o a.obj", &["Usage: normend generate"]);
+    check("generate torus -o a.stl", &["Usage: normend generate"]);
     check("a.ply extra", &["opens one scan", "Usage: normend ["]);
     check("a.ply orient", &["opens one scan", "comes first"]);
     check("frob", &["no file and no command", "'frob'", "Usage: normend ["]);

@@ -673,13 +673,13 @@ fn a_name_must_not_promise_a_format_that_is_not_written() {
     let scan = read(&input, &Silent).unwrap();
     let refused = |error: WriteError, target: &Path| {
         let expect = format!(
-            "{} cannot be written: Normend writes .ply .xyz .txt .asc .pts .csv; choose a name that ends with one of these",
+            "{} cannot be written: Normend writes .ply .las .laz .pcd .obj .xyz .txt .asc .pts .csv .e57 .ptx; choose a name that ends with one of these",
             target.display()
         );
         assert_eq!(error.to_string(), expect);
         assert!(!target.exists());
     };
-    for name in ["out.obj", "out.las", "out.ply.bak"] {
+    for name in ["out.stl", "out.dxf", "out.ply.bak"] {
         let target = folder.path().join(name);
         refused(
             scan.write(&[Vec3::X], &target, &options(), &Silent).unwrap_err(),

@@ -113,17 +113,18 @@ impl Scan {
 
     /// Whether the file has a color for each point.
     pub fn has_colors(&self) -> bool {
-        self.color_columns().is_some()
+        self.color_columns().is_some() || self.is_splats()
     }
 
     /// The file's colors by point as red, green, blue, gamma-encoded; `None` when it has none. Columns of bytes, of 16 bits,
-    /// and of shares of 1 are told apart by their type and their largest value. O(n), parallel; 24 bytes a point for a while.
+    /// and of shares of 1 are told apart by their type and their largest value; Gaussian splats have their mean color. O(n),
+    /// parallel; 24 bytes a point for a while.
     ///
     /// # Errors
     /// As [`Self::scalar`].
     pub fn colors(&self, progress: &dyn Progress) -> Result<Option<Vec<[u8; 3]>>, ReadError> {
         let Some(columns) = self.color_columns() else {
-            return Ok(None);
+            return self.splat_colors(progress);
         };
         let channels = self.read_columns(columns, progress)?;
         let largest = |values: &Vec<f64>| {
@@ -145,7 +146,7 @@ impl Scan {
     }
 
     /// The columns of numbers.
-    fn columns(&self) -> Vec<Column> {
+    pub(crate) fn columns(&self) -> Vec<Column> {
         let mut columns = self.file.layout.columns(&self.file.bytes);
         columns.retain(|column| column.kind != ColumnKind::Words);
         columns
@@ -159,7 +160,7 @@ impl Scan {
     }
 
     /// The values of some columns, by point.
-    fn read_columns<const N: usize>(
+    pub(crate) fn read_columns<const N: usize>(
         &self,
         columns: [usize; N],
         progress: &dyn Progress,

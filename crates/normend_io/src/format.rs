@@ -8,7 +8,7 @@ use normend_core::Progress;
 use crate::error::{Broken, WriteError};
 use crate::new_file::{Loss, NewFile};
 use crate::output::Output;
-use crate::{e57, las, new_text, pcd, ply, ptx, xyz};
+use crate::{e57, las, new_text, obj, pcd, ply, ptx, xyz};
 
 /// The formats that can be read and written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +19,8 @@ pub enum FileFormat {
     Las,
     /// Point Cloud Data of PCL: ascii, binary, packed.
     Pcd,
+    /// Wavefront OBJ: `v` and `vn` lines.
+    Obj,
     /// Text, a point a line: `x y z [nx ny nz …]`.
     Xyz,
     /// Scans with poses, packed, as laser scanners exchange them (ASTM E2807).
@@ -29,7 +31,7 @@ pub enum FileFormat {
 
 impl FileFormat {
     /// All formats, in the order of dialogs.
-    pub const ALL: [Self; 6] = [Self::Ply, Self::Las, Self::Pcd, Self::Xyz, Self::E57, Self::Ptx];
+    pub const ALL: [Self; 7] = [Self::Ply, Self::Las, Self::Pcd, Self::Obj, Self::Xyz, Self::E57, Self::Ptx];
 
     /// The name in dialogs.
     pub fn label(self) -> &'static str {
@@ -37,6 +39,7 @@ impl FileFormat {
             Self::Ply => "PLY",
             Self::Las => "LAS/LAZ",
             Self::Pcd => "PCD",
+            Self::Obj => "OBJ",
             Self::Xyz => "XYZ text",
             Self::E57 => "E57",
             Self::Ptx => "PTX",
@@ -49,6 +52,7 @@ impl FileFormat {
             Self::Ply => &["ply"],
             Self::Las => &["las", "laz"],
             Self::Pcd => &["pcd"],
+            Self::Obj => &["obj"],
             Self::E57 => &["e57"],
             Self::Ptx => &["ptx"],
             Self::Xyz => &["xyz", "txt", "asc", "pts", "csv"],
@@ -85,6 +89,7 @@ impl FileFormat {
             Self::Ply => ply::new::limit(file),
             Self::Las => las::new::limit(file, path),
             Self::Pcd => pcd::new::limit(file),
+            Self::Obj => obj::new::limit(file),
             Self::Xyz => new_text::limit(file, path),
             Self::E57 => e57::new::limit(file),
             Self::Ptx => ptx::new::limit(file),
@@ -96,7 +101,7 @@ impl FileFormat {
         match self {
             Self::Ply | Self::Las | Self::Pcd | Self::E57 => true,
             Self::Xyz => new_text::can_hold_side(path),
-            Self::Ptx => false,
+            Self::Ptx | Self::Obj => false,
         }
     }
 
@@ -111,6 +116,7 @@ impl FileFormat {
             Self::Ply => ply::new::write(file, out, progress),
             Self::Las => las::new::write(file, out, progress),
             Self::Pcd => pcd::new::write(file, out, progress),
+            Self::Obj => obj::new::write(file, out, progress),
             Self::Xyz => new_text::write(file, out, progress),
             Self::E57 => e57::new::write(file, out, progress),
             Self::Ptx => ptx::new::write(file, out, progress),
@@ -150,6 +156,7 @@ pub(crate) fn recognize(bytes: &[u8], path: &Path) -> Result<FileFormat, Broken>
     }
     match FileFormat::of_path(path) {
         Some(format) => Ok(format),
+        None if obj::sniff(bytes) => Ok(FileFormat::Obj),
         None if xyz::sniff(bytes) => Ok(FileFormat::Xyz),
         None => Err(Broken::whole(
             "this is neither PLY nor text with a point a line: convert it to PLY",

@@ -16,6 +16,8 @@ mod table;
 
 mod columns;
 
+mod splats;
+
 mod records;
 
 mod ply;
@@ -23,6 +25,8 @@ mod ply;
 mod las;
 
 mod pcd;
+
+mod obj;
 
 mod xyz;
 

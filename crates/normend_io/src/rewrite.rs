@@ -205,7 +205,7 @@ pub(crate) fn separator_before<'a>(layout: &dyn Layout, bytes: &'a [u8], start: 
 }
 
 /// What becomes of the normal that a row has.
-enum Change {
+pub(crate) enum Change {
     /// The bytes stay.
     Keep,
     /// The opposite: the bytes stay, but for the sign.
@@ -215,7 +215,7 @@ enum Change {
 }
 
 impl Change {
-    fn between(types: &[ValueType; N_VALUES], bytes: &[u8], spans: &Spans, normal: Option<Vec3>) -> Self {
+    pub fn between(types: &[ValueType; N_VALUES], bytes: &[u8], spans: &Spans, normal: Option<Vec3>) -> Self {
         let Some(normal) = normal else {
             return Self::Keep;
         };
@@ -236,7 +236,7 @@ impl Change {
         }
     }
 
-    fn write(&self, value_type: ValueType, component: usize, former: &[u8], out: &mut Vec<u8>) {
+    pub fn write(&self, value_type: ValueType, component: usize, former: &[u8], out: &mut Vec<u8>) {
         if let ValueType::LittleEndian(scalar) | ValueType::BigEndian(scalar) = value_type
             && !scalar.is_float()
         {

@@ -16,7 +16,7 @@ use crate::format::{FileFormat, recognize};
 use crate::on_disk::{Content, OnDisk};
 use crate::recipe::ScanIdentity;
 use crate::table::{Layout, read_place, read_points};
-use crate::{e57, las, pcd, ply, ptx, xyz};
+use crate::{e57, las, obj, pcd, ply, ptx, xyz};
 
 /// A scan as it was read: the points, and the file itself so that it can be written again with other normals.
 #[derive(Clone)]
@@ -167,6 +167,7 @@ fn decode(format: FileFormat, bytes: Vec<u8>, progress: &dyn Progress) -> Result
             }
             Box::new(pcd.layout)
         }
+        FileFormat::Obj => Box::new(obj::read(&bytes, progress)?),
         FileFormat::Xyz => Box::new(xyz::read(&bytes, progress)?),
         FileFormat::Ptx => Box::new(ptx::read(&bytes, progress)?),
         FileFormat::E57 => {

@@ -361,7 +361,7 @@ pub(crate) fn find_parts(
 /// The points of a file.
 pub(crate) struct Points {
     pub cloud: PointCloud,
-    /// By point, zero where a component is not finite; `None` without normals.
+    /// By point, zero where a component is not finite; `None` where there is none but zeros.
     pub normals: Option<Vec<Vec3>>,
     /// The row of each point, ascending; `None` when every row is a point.
     pub rows: Option<Vec<u32>>,
@@ -467,7 +467,8 @@ pub(crate) fn read_points(layout: &dyn Layout, bytes: &[u8], progress: &dyn Prog
     }
     Ok(Points {
         cloud,
-        normals: table.has_normals.then_some(normals),
+        // Programs that know no normals write zeros where the format has a place for them, as in Gaussian splats.
+        normals: Some(normals).filter(|normals| normals.par_iter().any(|normal| *normal != Vec3::ZERO)),
         rows: has_rows.then_some(rows),
     })
 }
@@ -550,7 +551,12 @@ fn read_part(
         let mut position = DVec3::new(value(0)?, value(1)?, value(2)?);
         let mut normal = Vec3::ZERO;
         if table.has_normals {
-            normal = Vec3::new(value(3)? as f32, value(4)? as f32, value(5)? as f32);
+            // Nothing in the place of a normal is none.
+            let component = |slot: usize| match spans[slot].start == spans[slot].end {
+                true => Ok(0.0),
+                false => value(slot).map(|value| value as f32),
+            };
+            normal = Vec3::new(component(3)?, component(4)?, component(5)?);
         }
         if let Some(frame) = frames.next().flatten() {
             position = frame.from_stored.transform_point3(position);

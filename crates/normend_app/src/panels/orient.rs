@@ -22,7 +22,7 @@ fn scan(ui: &mut Ui, session: &Session) {
         theme::row(
             ui,
             "File",
-            format!("{} ({})", theme::elided(&session.name, 24), session.scan.format.label()),
+            format!("{} ({})", theme::elided(&session.name, 24), session.scan.label()),
         );
         theme::row(ui, "Points", theme::thousands(session.scan.cloud.n_points() as u64));
         if session.scan.n_left_out > 0 {

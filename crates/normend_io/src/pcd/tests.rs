@@ -590,6 +590,11 @@ proptest! {
             prop_assert_eq!(again.given_normals.unwrap().to_vec(), normals);
         }
     }
+}
+
+proptest! {
+    // Each writes a file of some hundred kilobytes.
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
     #[test]
     fn large_packed_files_come_back(n_points in 1_usize..60_000, seed in any::<u32>()) {
