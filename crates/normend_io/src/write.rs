@@ -68,6 +68,7 @@ impl Scan {
             })
             .collect();
         losses.extend(format.limit(&mut file, path));
+        losses.extend(self.lost_scans(format));
         Ok(losses)
     }
 
@@ -155,6 +156,26 @@ impl Scan {
         );
         self.place(path, options, |out| {
             self.write_new(format, normals, &comment, out, progress)
+        })
+    }
+
+    /// What another format does not say of the scans that the points are from.
+    fn lost_scans(&self, format: FileFormat) -> Option<Loss> {
+        let frames = &self.file.layout.table().frames;
+        let n_named = frames.iter().filter(|frame| !frame.name.is_empty()).count();
+        let n_placed = frames.iter().filter(|frame| frame.station.is_some()).count();
+        let (n_named, n_placed) = match format {
+            FileFormat::E57 => (0, 0),
+            // PCD says itself which viewpoints it has no room for.
+            FileFormat::Ptx | FileFormat::Pcd => (n_named, 0),
+            _ => (n_named, n_placed),
+        };
+        let names = (n_named > 0).then(|| format!("names of scans ({n_named})"));
+        let places = (n_placed > 0).then(|| format!("places of scanners ({n_placed})"));
+        let parts: Vec<String> = names.into_iter().chain(places).collect();
+        (!parts.is_empty()).then(|| Loss {
+            what: parts.join(" and "),
+            why: format!("{} has no room for them", format.label()),
         })
     }
 

@@ -43,7 +43,7 @@ pub(super) fn check_header(bytes: &[u8]) -> Result<(), Broken> {
             format!("pages of {page} bytes where E57 has {PAGE}: export the file again"),
         ));
     }
-    if n_bytes > bytes.len() as u64 || bytes.len() % PAGE != 0 {
+    if n_bytes > bytes.len() as u64 || !bytes.len().is_multiple_of(PAGE) {
         return Err(Broken::whole(format!(
             "the header announces {n_bytes} bytes in pages of {PAGE}, but the file has {}: it is cut off, copy it again",
             bytes.len()

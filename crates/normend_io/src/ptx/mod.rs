@@ -401,7 +401,8 @@ impl PtxLayout {
                 .skip(n_values - 3)
                 .map(|word| parse(word).unwrap_or(f64::NAN).powi(2))
                 .sum();
-            if !((length - 1.0).abs() < 0.01) {
+            let is_unit = (length - 1.0).abs() < 0.01;
+            if !is_unit {
                 return false;
             }
         }

@@ -243,7 +243,7 @@ proptest! {
         prop_assert_eq!(scan.cloud.n_points(), n_points);
         let copy = String::from_utf8(written(&scan, &vec![Vec3::Z; n_points], "b.ptx")).unwrap();
         let without: String = copy.lines().map(|line| line.strip_suffix(" 0 0 1").unwrap_or(line).to_owned() + "\n").collect();
-        prop_assert_eq!(without.replace("0 0 1\n0 1 0 0", "0 0 1\n0 1 0 0"), text);
+        prop_assert_eq!(without, text);
     }
 }
 
