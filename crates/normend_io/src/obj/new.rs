@@ -14,17 +14,10 @@ pub(crate) fn limit(file: &mut NewFile<'_>) -> Vec<Loss> {
     let is_number = |field: usize| file.fields[field].kind != ColumnKind::Words;
     let colors = colors_of(file).filter(|colors| colors.iter().all(|&field| is_number(field)));
     let names = colors.map(|colors| colors.map(|field| file.fields[field].name.clone()));
-    let mut losses = file.drop_fields(|field| {
+    file.drop_fields(|field| {
         let is_color = names.as_ref().is_some_and(|names| names.contains(&field.name));
         (!is_color).then(|| "OBJ holds points, normals and colors only".to_owned())
-    });
-    if file.frames().iter().any(|frame| frame.station.is_some()) {
-        losses.push(Loss {
-            what: "the scanner's place".to_owned(),
-            why: "OBJ holds points, normals and colors only".to_owned(),
-        });
-    }
-    losses
+    })
 }
 
 fn colors_of(file: &NewFile<'_>) -> Option<[usize; 3]> {
@@ -43,6 +36,10 @@ pub(crate) fn write(file: &mut NewFile<'_>, out: &mut Output<'_>, progress: &dyn
     }
     file.write_rows(
         |row, out| {
+            // Most programs that read OBJ know no NaN.
+            if !row.position.is_finite() {
+                return;
+            }
             out.extend_from_slice(b"v ");
             row.push_coordinates(file.coordinates, b' ', out);
             if let Some((colors, white)) = scale {

@@ -203,6 +203,17 @@ fn new_files_have_points_colors_and_normals() {
         [Vec3::X, Vec3::new(0.0, 0.6, -0.8)]
     );
     assert_eq!(again.scalar("x", &Silent).unwrap().unwrap()[0], 500_000.001);
+    // Rows without a place are left out, and named.
+    let holes = read_bytes(b"1 2 3\nnan 5 6\n7 8 9\n".to_vec(), "a.xyz", &Silent).unwrap();
+    let losses: Vec<String> = holes
+        .losses("out.obj".as_ref())
+        .unwrap()
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    assert_eq!(losses, ["1 row without a place: OBJ holds points alone"]);
+    let out = written(&holes, &[Vec3::X, Vec3::Y], "out.obj");
+    assert!(out.ends_with("\nv 1 2 3\nvn 1 0 0\nv 7 8 9\nvn 0 1 0\n"), "{out}");
     // A mesh that becomes another format says what it was.
     let mesh = scan("v 1 2 3\nv 4 5 6\nvt 0 0\nf 1 2 1\nf 1 2 2\nusemtl a\n");
     let losses: Vec<String> = mesh
