@@ -16,7 +16,7 @@ use normend_core::evidence::Station;
 use normend_core::propagation::{ETA, VIEWS};
 use normend_core::shapes::ShapeKind;
 use normend_core::{EdgeRule, Estimator, Method, Parameters, Preset, SideRule, SourceRule, Start};
-use normend_io::{ReadError, Scan};
+use normend_io::{ReadError, ReadOptions, Scan};
 use normend_render::{DisplayMode, StandardView, UpAxis};
 
 use self::bench::BenchArguments;
@@ -168,6 +168,40 @@ pub struct CommonArguments {
     /// No bar and no words, only errors
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// What is known of files that they do not say.
+#[derive(Clone, Debug, Default, Args)]
+pub struct ReadArguments {
+    /// Names of a text's columns from the first on, in place of what stands in it: x y z, nx ny nz, red green blue, any others;
+    /// - for none
+    #[arg(long, value_name = "\"x y z …\"", value_parser = column_names, allow_hyphen_values = true)]
+    pub columns: Option<ColumnNames>,
+}
+
+/// Names of columns, as typed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ColumnNames(pub Vec<String>);
+
+impl ReadArguments {
+    /// How a file is read that these belong to.
+    pub fn options(&self) -> ReadOptions {
+        ReadOptions {
+            columns: self.columns.as_ref().map(|names| names.0.clone()),
+        }
+    }
+}
+
+/// Parses names with spaces or commas between them.
+fn column_names(typed: &str) -> Result<ColumnNames, String> {
+    let is_separator = |letter: char| letter.is_whitespace() || letter == ',' || letter == ';';
+    let names: Vec<String> = typed.split(is_separator).filter(|name| !name.is_empty()).map(str::to_owned).collect();
+    let has = |wanted: &str| names.iter().any(|name| name.eq_ignore_ascii_case(wanted));
+    if ["x", "y", "z"].into_iter().all(has) {
+        Ok(ColumnNames(names))
+    } else {
+        Err("name x, y and z among them, as in \"x y z - nx ny nz\"".to_owned())
+    }
 }
 
 /// How signs are found: a preset, and what is typed in place of its parameters.
@@ -354,6 +388,10 @@ pub struct OrientArguments {
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
 
+    /// How files are read.
+    #[command(flatten)]
+    pub reading: ReadArguments,
+
     /// How signs are found.
     #[command(flatten)]
     pub propagation: PropagationArguments,
@@ -403,6 +441,10 @@ pub struct CheckArguments {
     #[arg(long, value_name = "TRUTH")]
     pub reference: PathBuf,
 
+    /// How files are read.
+    #[command(flatten)]
+    pub reading: ReadArguments,
+
     /// Write one JSON object to standard output
     #[arg(long)]
     pub json: bool,
@@ -432,6 +474,10 @@ pub struct RenderArguments {
     /// Picture to write (PNG)
     #[arg(short, long, value_name = "PNG")]
     pub output: PathBuf,
+
+    /// How files are read.
+    #[command(flatten)]
+    pub reading: ReadArguments,
 
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value_t = PictureSize::default())]

@@ -61,6 +61,7 @@ pub use error::{Broken, Place, ReadError, WriteError, io_words};
 pub use format::FileFormat;
 pub use new_file::Loss;
 pub use save::{is_same_file, n_other_names};
-pub use scan::{Scan, read, read_bytes};
+pub use scan::{ReadOptions, Scan, read, read_bytes, read_bytes_with, read_with};
 pub use stations::{read_stations, stations_of_bytes};
 pub use write::{Positions, WriteOptions, write_bytes, write_points};
+pub use xyz::{ColumnsBy, TextColumns};

@@ -59,10 +59,13 @@ impl Cell<'_> {
     /// Appends it as text: a text's as it is, a number as short as it reads back.
     pub fn push_text(&self, out: &mut Vec<u8>) {
         match self.value_type {
-            ValueType::Text if self.bytes.is_empty() => out.extend_from_slice(b"nan"),
-            ValueType::Text => {
+            ValueType::Text | ValueType::TextComma if self.bytes.is_empty() => out.extend_from_slice(b"nan"),
+            ValueType::TextComma if self.value_type.read(self.bytes).is_some() => {
+                out.extend(self.bytes.iter().map(|&byte| if byte == b',' { b'.' } else { byte }));
+            }
+            ValueType::Text | ValueType::TextComma => {
                 // What separates values in this text may stand within one in another.
-                let is_separator = |byte: u8| matches!(byte, b',' | b';') || byte.is_ascii_control();
+                let is_separator = |byte: u8| matches!(byte, b',' | b';' | b'|') || byte.is_ascii_control();
                 out.extend(
                     self.bytes
                         .iter()
@@ -240,7 +243,7 @@ impl<'a> NewFile<'a> {
                         .into_iter()
                         .for_each(|value| kinds[0].add(value));
                     for (kind, cell) in kinds[1..].iter_mut().zip(row.cells) {
-                        if cell.value_type == ValueType::Text {
+                        if matches!(cell.value_type, ValueType::Text | ValueType::TextComma) {
                             kind.add(cell.number());
                         }
                     }
@@ -463,7 +466,10 @@ impl Pose {
         let is_pose = |place: &DVec3| *place != DVec3::ZERO || frame.turn != DMat3::IDENTITY;
         let moved = is_rigid.then_some(frame.from_stored.translation).filter(is_pose);
         let place = frame.station.or(moved)?;
-        Some(Self { turn: frame.turn, place })
+        Some(Self {
+            turn: frame.turn,
+            place,
+        })
     }
 
     /// A position of the scan in the scanner's own coordinates.

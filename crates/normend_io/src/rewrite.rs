@@ -150,11 +150,11 @@ fn insert(
             continue;
         }
         let value_type = match table.types[0] {
-            ValueType::Text => ValueType::Text,
+            text @ (ValueType::Text | ValueType::TextComma) => text,
             ValueType::BigEndian(_) => ValueType::BigEndian(new_type(slot)),
             _ => ValueType::LittleEndian(new_type(slot)),
         };
-        if value_type == ValueType::Text {
+        if matches!(value_type, ValueType::Text | ValueType::TextComma) {
             out.extend_from_slice(separator_before(layout, bytes, last.start));
         }
         if NORMAL.contains(&slot) {

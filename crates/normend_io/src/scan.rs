@@ -16,6 +16,7 @@ use crate::format::{FileFormat, recognize};
 use crate::on_disk::{Content, OnDisk};
 use crate::recipe::ScanIdentity;
 use crate::table::{Layout, read_place, read_points};
+use crate::xyz::TextColumns;
 use crate::{e57, las, obj, pcd, ply, ptx, xyz};
 
 /// A scan as it was read: the points, and the file itself so that it can be written again with other normals.
@@ -47,18 +48,34 @@ pub(crate) struct SourceFile {
     pub on_disk: OnDisk,
 }
 
+/// What a reader is told that the file does not say.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Names of a text's columns from the first on, in place of what stands in it and of how they look: `x y z`, `nx ny nz` and
+    /// any others; `-` for none. Other formats say themselves what their columns are, and this is not looked at.
+    pub columns: Option<Vec<String>>,
+}
+
 /// Reads a scan; the format is recognized by content, then by extension. Takes no more than the file's
 /// rows unpacked, and what is returned.
 ///
 /// # Errors
 /// [`ReadError`]; its message names the file, the place, the reason and what to do.
 pub fn read(path: &Path, progress: &dyn Progress) -> Result<Scan, ReadError> {
+    read_with(path, &ReadOptions::default(), progress)
+}
+
+/// Like [`read`], with what the caller knows of the file.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<Scan, ReadError> {
     progress.stage("Reading");
     // Before it is read: what changes meanwhile is a change.
     let source = Some((path, OnDisk::of(path)));
     let bytes = read_file(path, &Part::new(progress, 0.0..0.3))?;
     let name = path.display().to_string();
-    read_content(bytes, &name, source, &Part::new(progress, 0.3..1.0))
+    read_content(bytes, &name, source, options, &Part::new(progress, 0.3..1.0))
 }
 
 /// Reads a scan from memory; `name` stands for the path in messages and for the extension.
@@ -67,7 +84,21 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Scan, ReadError> {
 /// [`ReadError`], as [`read`].
 pub fn read_bytes(bytes: Vec<u8>, name: &str, progress: &dyn Progress) -> Result<Scan, ReadError> {
     progress.stage("Reading");
-    read_content(bytes, name, None, progress)
+    read_content(bytes, name, None, &ReadOptions::default(), progress)
+}
+
+/// Like [`read_bytes`], with what the caller knows of the content.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_bytes_with(
+    bytes: Vec<u8>,
+    name: &str,
+    options: &ReadOptions,
+    progress: &dyn Progress,
+) -> Result<Scan, ReadError> {
+    progress.stage("Reading");
+    read_content(bytes, name, None, options, progress)
 }
 
 pub(crate) fn read_file(path: &Path, progress: &dyn Progress) -> Result<Vec<u8>, ReadError> {
@@ -109,12 +140,14 @@ fn read_content(
     bytes: Vec<u8>,
     name: &str,
     source: Option<(&Path, OnDisk)>,
+    options: &ReadOptions,
     progress: &dyn Progress,
 ) -> Result<Scan, ReadError> {
     let in_file = |stop: Stop| stop.in_file(name);
     let format = recognize(&bytes, Path::new(name)).map_err(|broken| in_file(broken.into()))?;
     let n_bytes = bytes.len() as u64;
-    let Decoded { bytes, layout, hash } = decode(format, bytes, &Part::new(progress, 0.0..0.5)).map_err(in_file)?;
+    let Decoded { bytes, layout, hash } =
+        decode(format, bytes, options, &Part::new(progress, 0.0..0.5)).map_err(in_file)?;
     let points = read_points(layout.as_ref(), &bytes, &Part::new(progress, 0.5..1.0)).map_err(in_file)?;
     let n_left_out = layout.table().n_rows - points.cloud.n_points();
     let (path, on_disk) = source.unzip();
@@ -143,12 +176,16 @@ struct Decoded {
 }
 
 /// Finds the rows of a file, or unpacks them.
-fn decode(format: FileFormat, bytes: Vec<u8>, progress: &dyn Progress) -> Result<Decoded, Stop> {
+fn decode(format: FileFormat, bytes: Vec<u8>, options: &ReadOptions, progress: &dyn Progress) -> Result<Decoded, Stop> {
     let layout: Box<dyn Layout> = match format {
         FileFormat::Ply => Box::new(ply::read(&bytes, progress)?),
         FileFormat::Las => {
             // What is unpacked is another content than the file's.
-            let hash = if las::is_packed(&bytes) { OnceLock::from(hash(&bytes)) } else { OnceLock::new() };
+            let hash = if las::is_packed(&bytes) {
+                OnceLock::from(hash(&bytes))
+            } else {
+                OnceLock::new()
+            };
             let (bytes, layout) = las::read(bytes, progress)?;
             return Ok(Decoded {
                 bytes,
@@ -168,7 +205,7 @@ fn decode(format: FileFormat, bytes: Vec<u8>, progress: &dyn Progress) -> Result
             Box::new(pcd.layout)
         }
         FileFormat::Obj => Box::new(obj::read(&bytes, progress)?),
-        FileFormat::Xyz => Box::new(xyz::read(&bytes, progress)?),
+        FileFormat::Xyz => Box::new(xyz::read(&bytes, options.columns.as_deref(), progress)?),
         FileFormat::Ptx => Box::new(ptx::read(&bytes, progress)?),
         FileFormat::E57 => {
             let hash = OnceLock::from(hash(&bytes));
@@ -229,7 +266,18 @@ impl Scan {
             n_bytes,
             hash,
             n_points: self.cloud.n_points() as u64,
+            columns: self.columns_given().map(<[String]>::to_vec),
         }
+    }
+
+    /// What the columns of a text are and how they were told; `None` for other formats. Looks at the first thousand rows.
+    pub fn text_columns(&self) -> Option<TextColumns> {
+        Some(self.file.layout.as_text()?.text_columns(&self.file.bytes))
+    }
+
+    /// The names that the columns were given by [`ReadOptions`], if the scan is a text and they were.
+    pub fn columns_given(&self) -> Option<&[String]> {
+        self.file.layout.as_text()?.given()
     }
 
     /// Places that the file says its points were measured from, with the points of each, ascending. O(number of places).

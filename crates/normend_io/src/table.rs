@@ -16,6 +16,7 @@ use crate::new_file::Loss;
 use crate::output::Output;
 use crate::rewrite::RowNormals;
 use crate::value::ValueType;
+use crate::xyz::XyzLayout;
 
 /// Rows of a part: the unit of parallel work.
 pub(crate) const PART_ROWS: usize = 1 << 14;
@@ -259,6 +260,11 @@ pub(crate) trait Layout: Send + Sync {
 
     /// Columns that hold red, green and blue without saying so.
     fn unnamed_colors(&self, _bytes: &[u8]) -> Option<[usize; 3]> {
+        None
+    }
+
+    /// The layout as that of a text with columns.
+    fn as_text(&self) -> Option<&XyzLayout> {
         None
     }
 

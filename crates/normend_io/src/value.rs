@@ -36,6 +36,8 @@ impl Scalar {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum ValueType {
     Text,
+    /// Text with a comma in place of the point.
+    TextComma,
     LittleEndian(Scalar),
     BigEndian(Scalar),
     /// `n_bits` bits of one byte, from bit `first` on: a whole number that is only read.
@@ -125,7 +127,7 @@ impl ValueType {
     /// The type of a binary number.
     pub fn scalar(self) -> Option<Scalar> {
         match self {
-            Self::Text => None,
+            Self::Text | Self::TextComma => None,
             Self::LittleEndian(scalar) | Self::BigEndian(scalar) => Some(scalar),
             Self::Bits { .. } | Self::TextByte { .. } => Some(Scalar::UChar),
             Self::Scaled(..) => Some(Scalar::Double),
@@ -158,6 +160,7 @@ impl ValueType {
     pub fn read(self, bytes: &[u8]) -> Option<f64> {
         Some(match self {
             Self::Text => return parse(bytes),
+            Self::TextComma => return parse_with_comma(bytes),
             Self::LittleEndian(scalar) => from_bytes!(scalar, from_le_bytes, bytes),
             Self::BigEndian(scalar) => from_bytes!(scalar, from_be_bytes, bytes),
             Self::Bits { first, n_bits } => {
@@ -176,6 +179,11 @@ impl ValueType {
         let value = value + 0.0;
         match self {
             Self::Text => push_number(f64::from(value), true, out),
+            Self::TextComma => {
+                let start = out.len();
+                push_number(f64::from(value), true, out);
+                replace_byte(&mut out[start..], b'.', b',');
+            }
             Self::LittleEndian(Scalar::Double) => out.extend_from_slice(&f64::from(value).to_le_bytes()),
             Self::BigEndian(Scalar::Double) => out.extend_from_slice(&f64::from(value).to_be_bytes()),
             Self::LittleEndian(_) => out.extend_from_slice(&value.to_le_bytes()),
@@ -208,7 +216,7 @@ impl ValueType {
         let start = out.len();
         match self {
             _ if self.read(bytes) == Some(0.0) => out.extend_from_slice(bytes),
-            Self::Text => match bytes {
+            Self::Text | Self::TextComma => match bytes {
                 [b'-', digits @ ..] => out.extend_from_slice(digits),
                 [b'+', digits @ ..] | digits => {
                     out.push(b'-');
@@ -231,6 +239,27 @@ impl ValueType {
                 self.write(-self.read(bytes).unwrap_or(0.0) as f32, out);
             }
         }
+    }
+}
+
+/// Reads a number in text with a decimal comma or without one.
+fn parse_with_comma(token: &[u8]) -> Option<f64> {
+    /// More digits than any `f64` needs.
+    const LONGEST: usize = 64;
+    if !token.contains(&b',') {
+        return parse(token).filter(|_| !token.contains(&b'.'));
+    }
+    let mut with_point = [0_u8; LONGEST];
+    let with_point = with_point.get_mut(..token.len())?;
+    with_point.copy_from_slice(token);
+    replace_byte(with_point, b',', b'.');
+    parse(with_point).filter(|_| !token.contains(&b'.'))
+}
+
+/// Puts one byte in the place of another.
+pub(crate) fn replace_byte(bytes: &mut [u8], from: u8, to: u8) {
+    for byte in bytes.iter_mut().filter(|byte| **byte == from) {
+        *byte = to;
     }
 }
 

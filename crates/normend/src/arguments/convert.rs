@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 use normend_io::FileFormat;
 
-use super::CommonArguments;
+use super::{CommonArguments, ReadArguments};
 
 /// `normend convert`.
 #[derive(Debug, Args)]
@@ -31,6 +31,10 @@ pub struct ConvertArguments {
     /// File to write; a folder when there are several inputs
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
+
+    /// How files are read.
+    #[command(flatten)]
+    pub reading: ReadArguments,
 
     /// The format of files that go to a folder, by its extension
     #[arg(long, value_name = "EXT", value_parser = extensions())]

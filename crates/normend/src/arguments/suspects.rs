@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use normend_core::{SideRule, suspects};
 
-use super::{CommonArguments, ScannerArguments, one_of};
+use super::{CommonArguments, ReadArguments, ScannerArguments, one_of};
 
 /// Most suspects that can be asked for: each is a line for a person to read.
 const MOST: u64 = 100_000;
@@ -35,6 +35,10 @@ pub struct SuspectsArguments {
     /// Scan to look at: PLY, or XYZ text
     #[arg(value_name = "IN")]
     pub input: PathBuf,
+
+    /// How files are read.
+    #[command(flatten)]
+    pub reading: ReadArguments,
 
     /// Show at most this many
     #[arg(long, value_name = "N", default_value_t = suspects::MOST, value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST))]

@@ -41,7 +41,7 @@ pub fn run(arguments: &ConvertArguments) -> anyhow::Result<Outcome> {
 
 fn convert(job: &Job, arguments: &ConvertArguments, bar: &Bar) -> anyhow::Result<Converted> {
     check_may_write(&job.output, arguments.overwrite)?;
-    let scan = normend_io::read(&job.input, &Part::new(bar, 0.0..0.5))?;
+    let scan = super::read(&job.input, &arguments.reading, bar, &Part::new(bar, 0.0..0.5))?;
     let losses = refuse_or_say_losses(&scan, job, arguments.strict, bar)?;
     say_other_names(&job.output, bar);
     let options = WriteOptions {

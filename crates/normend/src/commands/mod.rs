@@ -14,9 +14,10 @@ use std::fmt;
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use normend_io::FileFormat;
+use normend_core::Progress;
+use normend_io::{FileFormat, ReadError, Scan};
 
-use crate::arguments::CommonArguments;
+use crate::arguments::{CommonArguments, ReadArguments};
 use crate::console::{self, Bar};
 
 /// How a command ended when nothing stopped it.
@@ -74,6 +75,24 @@ fn check_is_file_name(output: &Path) -> anyhow::Result<()> {
 fn check_scan_name(output: &Path, input: Option<&Path>) -> anyhow::Result<()> {
     check_is_file_name(output)?;
     FileFormat::of_target(output, input).map(drop).map_err(wrong_use)
+}
+
+/// Reads a scan, and says what the columns of a text were taken for where that is not certain.
+///
+/// # Errors
+/// As [`normend_io::read`].
+fn read(path: &Path, reading: &ReadArguments, bar: &Bar, progress: &dyn Progress) -> Result<Scan, ReadError> {
+    let scan = normend_io::read_with(path, &reading.options(), progress)?;
+    if let Some(columns) = scan.text_columns().filter(|columns| !columns.is_certain) {
+        let name = |name: &String| if name.is_empty() { "-".to_owned() } else { name.clone() };
+        let names: Vec<String> = columns.names.iter().map(name).collect();
+        bar.say(&format!(
+            "{}: its columns have no names; taken for \"{}\" (--columns says it otherwise)",
+            path.display(),
+            names.join(" ")
+        ));
+    }
+    Ok(scan)
 }
 
 /// Refuses, before the work, to replace a file that nobody allowed to replace.

@@ -133,7 +133,7 @@ fn orient(job: &Job, parameters: Parameters, arguments: &OrientArguments, bar: &
     let started = Instant::now();
     let mut seconds = Seconds::default();
 
-    let scan = normend_io::read(&job.input, &Part::new(bar, 0.0..0.1))?;
+    let scan = super::read(&job.input, &arguments.reading, bar, &Part::new(bar, 0.0..0.1))?;
     seconds.0.push(("read", started.elapsed().as_secs_f64()));
     let points = scan.cloud.n_points();
     let losses = refuse_or_say_losses(&scan, job, arguments.strict, bar)?;

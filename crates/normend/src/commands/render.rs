@@ -166,7 +166,7 @@ fn write(output: &Path, PictureSize { width, height }: PictureSize, rgba: &[u8])
 /// The scan with the normals of its file; points without one get an oriented normal. And the file's colors, where the mode
 /// shows them: RGBA8 by point.
 fn read_oriented(arguments: &RenderArguments, bar: &Bar) -> anyhow::Result<(Document, Option<Vec<u32>>)> {
-    let scan = normend_io::read(&arguments.input, &Part::new(bar, 0.0..0.08))?;
+    let scan = super::read(&arguments.input, &arguments.reading, bar, &Part::new(bar, 0.0..0.08))?;
     let colors = match arguments.mode {
         DisplayMode::Colors => {
             let colors = scan

@@ -12,7 +12,7 @@ use normend_core::evidence::Known;
 use normend_core::progress::Part;
 use normend_core::{EditError, Parameters, Progress, Propagation, SideRule, Silent};
 use normend_io::recipe::{self, End, Event, Recipe};
-use normend_io::{Scan, WriteOptions, is_same_file};
+use normend_io::{ReadOptions, Scan, WriteOptions, is_same_file};
 use serde::Serialize;
 
 use super::batch::open_report;
@@ -140,7 +140,10 @@ fn replay(arguments: &ReplayArguments, bar: &Bar) -> anyhow::Result<Replayed> {
     check_may_write(&arguments.output, arguments.overwrite)?;
     let started = Instant::now();
     let recipe = read_recipe(&arguments.recipe, bar)?;
-    let scan = normend_io::read(&arguments.input, &Part::new(bar, 0.0..0.1))?;
+    let reading = ReadOptions {
+        columns: recipe.head.scan.columns.clone(),
+    };
+    let scan = normend_io::read_with(&arguments.input, &reading, &Part::new(bar, 0.0..0.1))?;
     let read = started.elapsed().as_secs_f64();
     let same_content = check_scan(&recipe, &scan, arguments)?;
 

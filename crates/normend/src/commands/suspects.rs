@@ -68,7 +68,7 @@ pub fn run(arguments: &SuspectsArguments) -> anyhow::Result<Outcome> {
     prepare(&arguments.common)?;
     let mut file = json.map(|path| open_report(path, arguments.overwrite)).transpose()?;
     let bar = Bar::new(&title_of(&arguments.input), arguments.common.quiet);
-    let scan = normend_io::read(&arguments.input, &Part::new(&bar, 0.0..0.1))?;
+    let scan = super::read(&arguments.input, &arguments.reading, &bar, &Part::new(&bar, 0.0..0.1))?;
     let known = Known {
         given: scan.given_normals.as_ref().map(|normals| normals.as_slice()),
         stations: &arguments.scanner.stations(&scan)?,

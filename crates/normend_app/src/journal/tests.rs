@@ -13,6 +13,7 @@ fn scan(hash: u8, path: &str) -> ScanIdentity {
         n_bytes: 10,
         hash: [hash; 32],
         n_points: 100,
+        columns: None,
     }
 }
 

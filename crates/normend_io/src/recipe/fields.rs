@@ -42,6 +42,8 @@ struct ScanLine {
     bytes: u64,
     blake3: String,
     points: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    columns: Option<Vec<String>>,
 }
 
 impl HeadLine {
@@ -66,6 +68,7 @@ impl From<&Head> for HeadLine {
                 bytes: scan.n_bytes,
                 blake3: blake3::Hash::from_bytes(scan.hash).to_hex().to_string(),
                 points: scan.n_points,
+                columns: scan.columns.clone(),
             },
             parameters: head.parameters.into(),
         }
@@ -86,6 +89,7 @@ impl TryFrom<HeadLine> for Head {
                 n_bytes: line.scan.bytes,
                 hash: *hash.as_bytes(),
                 n_points: line.scan.points,
+                columns: line.scan.columns,
             },
             parameters: line.parameters.try_into()?,
         })

@@ -40,12 +40,14 @@ pub struct ScanIdentity {
     pub hash: [u8; 32],
     /// Points that were read from it.
     pub n_points: u64,
+    /// The names that a text's columns were given ([`crate::ReadOptions::columns`]); `None` where it was read as it is.
+    pub columns: Option<Vec<String>>,
 }
 
 impl ScanIdentity {
-    /// Whether the content is the same, wherever the files are.
+    /// Whether the content is the same and was read in the same way, wherever the files are.
     pub fn is_same_content(&self, other: &Self) -> bool {
-        (self.n_bytes, self.hash) == (other.n_bytes, other.hash)
+        (self.n_bytes, self.hash, &self.columns) == (other.n_bytes, other.hash, &other.columns)
     }
 }
 

@@ -104,6 +104,7 @@ fn any_recipe(n_events: usize) -> impl Strategy<Value = Recipe> {
         n_bytes,
         hash,
         n_points,
+        columns: (n_points % 2 == 0).then(|| vec!["x".into(), "-".into(), "y".into(), "z".into()]),
     });
     let events = prop::collection::vec(any_event(), 0..=n_events);
     (scan, any_parameters(), events).prop_map(|(scan, parameters, events)| Recipe {
@@ -247,6 +248,7 @@ fn a_head() -> Head {
         n_bytes: 123_456_789,
         hash: [7; 32],
         n_points: 4_000_000,
+        columns: None,
     };
     Head::new(scan, Parameters::default())
 }

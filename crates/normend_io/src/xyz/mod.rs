@@ -1,31 +1,45 @@
 //! Points in text, one a line, in and out: `.xyz`, `.txt`, `.asc`, `.pts`, `.csv`.
 //!
-//! Values are separated by spaces, tabs, commas or semicolons. Comments (`#`, `//`), empty lines, one line of column
-//! names and the counts of PTS files are kept as they are. Without column names, columns 4 to 6 are normals only when
-//! there are exactly six and they have unit length.
+//! Values are separated by spaces, tabs, commas, semicolons or bars. Comments (`#`, `//`), empty lines, one line of column
+//! names and the counts of PTS files are kept as they are. Without column names the first three columns are the coordinates, and
+//! the first rows tell normals and colors ([`columns`]).
+
+mod columns;
+mod lines;
+
+#[cfg(test)]
+mod tests;
 
 use normend_core::{PointCloud, Progress};
 
+pub use self::columns::{ColumnsBy, TextColumns};
+use self::columns::{SAMPLE_ROWS, find, look};
+use self::lines::{Decimal, Lines, Values, is_skipped};
 use crate::columns::{Column, ColumnKind, slots_for};
 use crate::error::{Broken, Place, Stop, WriteError, quoted};
 use crate::output::Output;
 use crate::rewrite::{rewrite, separator_before};
 use crate::table::{
     COORDINATES, Layout, N_VALUES, NORMAL, NewContent, Rows, SIDE, Span, Spans, Starts, Table, VALUE_NAMES, find_parts,
-    is_space,
 };
-use crate::value::{ValueType, parse};
+use crate::value::ValueType;
 
-/// Rows looked at to tell normals from colors.
-const SAMPLE_ROWS: usize = 1000;
+/// Rows that are shown of a text.
+const SHOWN_ROWS: usize = 8;
+/// Most columns without names that are told apart; more are not shown either.
+const MOST_SHOWN: usize = 64;
 
 /// A text whose columns are known.
 #[derive(Clone, Debug)]
 pub(crate) struct XyzLayout {
     /// What ends a line: `\n`, or `\r` when there is no `\n`.
     line_end: u8,
+    decimal: Decimal,
     /// The names of the columns, to the end of their line.
     names: Option<Span>,
+    /// The names that the caller gave the columns, if any.
+    given: Option<Vec<String>>,
+    by: ColumnsBy,
     /// Whether lines with a single number announce how many points follow, as in PTS files.
     has_counts: bool,
     /// The column of each value, by slot.
@@ -35,30 +49,38 @@ pub(crate) struct XyzLayout {
     table: Table,
 }
 
-/// Finds out what the columns of a text are and where its lines are.
-pub(crate) fn read(bytes: &[u8], progress: &dyn Progress) -> Result<XyzLayout, Stop> {
+/// Finds out what the columns of a text are and where its lines are; `given` are names of its columns in place of what stands
+/// there.
+pub(crate) fn read(bytes: &[u8], given: Option<&[String]>, progress: &dyn Progress) -> Result<XyzLayout, Stop> {
     let line_end = match memchr::memchr(b'\n', bytes) {
         None if memchr::memchr(b'\r', bytes).is_some() => b'\r',
         _ => b'\n',
     };
+    let found = find(bytes, line_end, given)?;
+    let start = found.start;
+    let value_type = match found.decimal {
+        Decimal::Point => ValueType::Text,
+        Decimal::Comma => ValueType::TextComma,
+    };
     let mut layout = XyzLayout {
         line_end,
-        names: None,
-        has_counts: false,
-        columns: UNNAMED,
+        decimal: found.decimal,
+        names: found.names,
+        given: given.map(<[String]>::to_vec),
+        by: found.by,
+        has_counts: found.has_counts,
+        columns: found.columns,
         n_required: 0,
         table: Table {
             n_rows: 0,
-            types: [ValueType::Text; N_VALUES],
-            has_normals: false,
+            types: [value_type; N_VALUES],
+            has_normals: found.columns[NORMAL].iter().all(Option::is_some),
             order: Vec::new(),
             starts: Starts::Parts(Vec::new()),
             end: 0,
             frames: Vec::new(),
         },
     };
-    let start = layout.find_columns(bytes)?;
-    layout.table.has_normals = layout.columns[NORMAL].iter().all(Option::is_some);
     layout.n_required = layout.columns.iter().flatten().max().map_or(0, |&last| last + 1);
     let mut order: Vec<usize> = (0..N_VALUES).filter(|&slot| layout.columns[slot].is_some()).collect();
     order.sort_unstable_by_key(|&slot| layout.columns[slot]);
@@ -97,176 +119,19 @@ pub(crate) fn sniff(bytes: &[u8]) -> bool {
         .take(3);
     !head.contains(&0)
         && lines.any(|line| {
-            Values::new(line)
-                .take(3)
-                .filter(|span| parse(span.of(line)).is_some())
-                .count()
-                == 3
+            [
+                (Decimal::Point, ValueType::Text),
+                (Decimal::Comma, ValueType::TextComma),
+            ]
+            .iter()
+            .any(|&(decimal, number)| {
+                let values = Values::new(line, decimal).take(3);
+                values.filter(|span| number.read(span.of(line)).is_some()).count() == 3
+            })
         })
 }
 
 impl XyzLayout {
-    /// Finds the columns, by their names or by looking at the first rows; returns the byte where the first row may begin.
-    fn find_columns(&mut self, bytes: &[u8]) -> Result<usize, Broken> {
-        // A byte order mark is no value.
-        let start = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
-        let mut lines = Lines {
-            bytes,
-            line_end: self.line_end,
-            at: start,
-        };
-        let mut row_start = start;
-        let mut title = None;
-        let mut names = Vec::new();
-        let first_row = loop {
-            let at = lines.at;
-            let Some(line) = lines.next() else {
-                return Ok(row_start);
-            };
-            let content = line.of(bytes);
-            if is_skipped(content) {
-                let hidden = content
-                    .iter()
-                    .take_while(|byte| is_space(**byte) || matches!(byte, b'#' | b'/'))
-                    .count();
-                // CloudCompare writes the names into a comment.
-                if are_names(&content[hidden..]) {
-                    names.push(Span {
-                        start: line.start + hidden,
-                        end: line.end,
-                    });
-                }
-                continue;
-            }
-            let mut values = Values::new(content);
-            if values.next().is_none_or(|value| parse(value.of(content)).is_none()) {
-                if title.is_some() {
-                    return Err(self.not_a_row(bytes, line));
-                }
-                title = Some(line);
-                names.push(line);
-                row_start = lines.at;
-            } else if values.next().is_some() {
-                lines.at = at;
-                break line;
-            } else {
-                self.has_counts = true;
-            }
-        };
-        self.refuse_decimal_commas(bytes, first_row)?;
-        let n_columns = Values::new(first_row.of(bytes)).count();
-        let (names, others): (Vec<Span>, Vec<Span>) =
-            (names.into_iter()).partition(|names| Values::new(names.of(bytes)).count() == n_columns);
-        let named = names
-            .iter()
-            .find_map(|names| Some((*names, columns_by_name(names.of(bytes))?)));
-        if let Some((names, columns)) = named {
-            self.names = Some(names);
-            self.columns = columns;
-            // Names in a comment: the rows begin after it, because export may add names.
-            row_start = row_start.max(names.end);
-        } else {
-            self.names = title.filter(|title| names.contains(title));
-            if self.sample_is_normals(bytes, lines) {
-                self.columns[NORMAL].copy_from_slice(&[Some(3), Some(4), Some(5)]);
-            }
-        }
-        self.refuse_names_to_come(bytes, &others, n_columns)?;
-        Ok(row_start)
-    }
-
-    /// Each time that normals are written, rows have three more values, and a line that is not their names now must not become
-    /// them and say that the coordinates are elsewhere.
-    fn refuse_names_to_come(&self, bytes: &[u8], lines: &[Span], n_columns: usize) -> Result<(), Broken> {
-        if self.columns[NORMAL].iter().any(Option::is_some) {
-            return Ok(());
-        }
-        let after = self.columns[COORDINATES]
-            .iter()
-            .flatten()
-            .max()
-            .map_or(0, |&last| last + 1);
-        let added = [Some(after), Some(after + 1), Some(after + 2)];
-        for line in lines {
-            let content = line.of(bytes);
-            let n_names = Values::new(content).count();
-            let may_fit = n_names > n_columns && (n_names - n_columns).is_multiple_of(NORMAL.len());
-            let Some(named) = columns_by_name(content).filter(|_| may_fit) else {
-                continue;
-            };
-            let is_same = named[COORDINATES] == self.columns[COORDINATES]
-                && (named[NORMAL] == added || named[NORMAL] == [None; NORMAL.end - NORMAL.start]);
-            if !is_same {
-                return Err(Broken::new(
-                    self.place(bytes, line.start),
-                    format!(
-                        "{} names {n_names} columns, and the first row has {n_columns} values: correct or remove the line",
-                        quoted(content.trim_ascii())
-                    ),
-                ));
-            }
-        }
-        Ok(())
-    }
-
-    fn not_a_row(&self, bytes: &[u8], line: Span) -> Broken {
-        Broken::new(
-            self.place(bytes, line.start),
-            format!(
-                "{} does not begin with a number: correct or remove the line",
-                quoted(line.of(bytes).trim_ascii())
-            ),
-        )
-    }
-
-    /// Commas in numbers and commas between numbers cannot be told apart, so the doubtful are refused.
-    fn refuse_decimal_commas(&self, bytes: &[u8], line: Span) -> Result<(), Broken> {
-        let content = line.of(bytes).trim_ascii();
-        let has_semicolons = content.contains(&b';');
-        let has_plain_spaces = Values::new(content)
-            .zip(Values::new(content).skip(1))
-            .any(|(value, next)| {
-                let between = &content[value.end..next.start];
-                !between.contains(&b',') && !between.contains(&b';')
-            });
-        if content.contains(&b',') && (has_semicolons || has_plain_spaces) {
-            return Err(Broken::new(
-                self.place(bytes, line.start),
-                format!(
-                    "{} has commas besides other separators, as in decimal commas: write numbers with a point",
-                    quoted(content)
-                ),
-            ));
-        }
-        Ok(())
-    }
-
-    /// Whether the first rows have six columns of which the last three are unit vectors (or zero, but not all).
-    fn sample_is_normals(&self, bytes: &[u8], lines: Lines<'_>) -> bool {
-        let mut n_units = 0;
-        for line in lines.filter(|line| !is_skipped(line.of(bytes))).take(SAMPLE_ROWS) {
-            let content = line.of(bytes);
-            let values: Vec<f64> = Values::new(content)
-                .take(7)
-                .map_while(|value| parse(value.of(content)))
-                .collect();
-            match values[..] {
-                [_, _, _, nx, ny, nz] => {
-                    let squared_length = nx * nx + ny * ny + nz * nz;
-                    if (squared_length - 1.0).abs() < 0.02 {
-                        n_units += 1;
-                    } else if squared_length != 0.0 {
-                        return false;
-                    }
-                }
-                // The count of a PTS file.
-                [_] => {}
-                _ => return false,
-            }
-        }
-        n_units > 0
-    }
-
     /// The first rows.
     fn sample<'a>(&self, bytes: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
         let lines = Lines {
@@ -275,34 +140,101 @@ impl XyzLayout {
             at: self.table.start(),
         };
         let n_required = self.n_required;
-        let is_row = move |line: &&[u8]| !is_skipped(line) && Values::new(line).count() >= n_required;
+        let decimal = self.decimal;
+        let is_row = move |line: &&[u8]| !is_skipped(line) && Values::new(line, decimal).count() >= n_required;
         lines.map(|line| line.of(bytes)).filter(is_row).take(SAMPLE_ROWS)
     }
 
-    /// The last three of six or seven columns without names, as programs write points with colors, or with intensity and colors:
-    /// whole numbers up to 255 in all of the first rows, and not only 0 and 1.
-    fn sample_of_colors(&self, bytes: &[u8]) -> Option<[usize; 3]> {
-        if self.names.is_some() || self.table.has_normals {
-            return None;
-        }
-        let mut largest = 0.0_f64;
-        let mut n_columns = None;
-        for row in self.sample(bytes) {
-            let values: Vec<f64> = Values::new(row).map_while(|value| parse(value.of(row))).collect();
-            let expected = *n_columns.get_or_insert(values.len());
-            let is_channel = |value: &f64| (0.0..=255.0).contains(value) && value.fract() == 0.0;
-            if !matches!(values.len(), 6 | 7)
-                || values.len() != expected
-                || !values[expected - 3..].iter().all(is_channel)
-            {
-                return None;
+    /// Names of the columns, as far as there are any; empty where there is none.
+    fn column_names(&self, bytes: &[u8]) -> Vec<String> {
+        let n_columns = self
+            .sample(bytes)
+            .next()
+            .map_or(0, |row| Values::new(row, self.decimal).count());
+        let mut names = match &self.given {
+            // A column that is not to be read has no name.
+            Some(given) => given.iter().map(|name| name.replace('-', "")).collect(),
+            None => {
+                let names = self.names.map_or(&b""[..], |names| names.of(bytes));
+                let name = |name: Span| {
+                    let name = String::from_utf8_lossy(name.of(names)).into_owned();
+                    name.trim_matches(['"', '\'']).to_owned()
+                };
+                Values::new(names, self.decimal).map(name).collect::<Vec<String>>()
             }
-            largest = values[expected - 3..]
-                .iter()
-                .fold(largest, |largest, &value| largest.max(value));
+        };
+        names.resize(n_columns, String::new());
+        names
+    }
+
+    /// The names that the caller gave the columns.
+    pub(crate) fn given(&self) -> Option<&[String]> {
+        self.given.as_deref()
+    }
+
+    /// What the columns are, for a person to confirm.
+    pub(crate) fn text_columns(&self, bytes: &[u8]) -> TextColumns {
+        let mut names = self.column_names(bytes);
+        names.truncate(MOST_SHOWN);
+        let n_columns = names.len();
+        if self.by == ColumnsBy::Look {
+            let mut name = |column: Option<usize>, name: &str| {
+                if let Some(shown) = column
+                    .and_then(|column| names.get_mut(column))
+                    .filter(|shown| shown.is_empty())
+                {
+                    *shown = name.to_owned();
+                }
+            };
+            for slot in COORDINATES.start..NORMAL.end {
+                name(self.columns[slot], VALUE_NAMES[slot]);
+            }
+            let look = self.look(bytes);
+            for (channel, color) in ["red", "green", "blue"].into_iter().enumerate() {
+                name(look.colors.map(|columns| columns[channel]), color);
+            }
+            name(look.intensity, "intensity");
         }
-        let last = n_columns.filter(|_| largest > 1.0)?;
-        Some([last - 3, last - 2, last - 1])
+        let first = self.sample(bytes).next().unwrap_or_default().trim_ascii();
+        let has = |mark: u8| first.contains(&mark);
+        TextColumns {
+            is_certain: match self.by {
+                ColumnsBy::Names | ColumnsBy::Caller => true,
+                ColumnsBy::Look => n_columns <= 3 || (n_columns == 6 && self.table.has_normals),
+            },
+            by: self.by,
+            separator: match self.decimal {
+                _ if has(b';') => "semicolons",
+                _ if has(b'|') => "bars",
+                Decimal::Point if has(b',') => "commas",
+                _ if has(b'\t') => "tabs",
+                _ => "spaces",
+            },
+            has_decimal_commas: self.decimal == Decimal::Comma,
+            sample: (self.sample(bytes).take(SHOWN_ROWS))
+                .map(|row| {
+                    let values = Values::new(row, self.decimal).take(n_columns);
+                    values
+                        .map(|value| String::from_utf8_lossy(value.of(row)).into_owned())
+                        .collect()
+                })
+                .collect(),
+            names,
+        }
+    }
+
+    /// What the columns look like that have no names.
+    fn look(&self, bytes: &[u8]) -> columns::Look {
+        let lines = Lines {
+            bytes,
+            line_end: self.line_end,
+            at: self.table.start(),
+        };
+        let n_columns = self
+            .sample(bytes)
+            .next()
+            .map_or(0, |row| Values::new(row, self.decimal).count());
+        look(bytes, lines, self.decimal, n_columns)
     }
 
     /// What changes before the first row when normals, and `with_side` confidence, are written: the names of their columns, if
@@ -318,7 +250,7 @@ impl XyzLayout {
         };
         let content = names.of(bytes);
         let last = self.columns[self.table.anchor()].unwrap_or(2);
-        let Some(name) = Values::new(content).nth(last) else {
+        let Some(name) = Values::new(content, self.decimal).nth(last) else {
             return Vec::new();
         };
         let at = names.start + name.end;
@@ -352,26 +284,25 @@ impl Layout for XyzLayout {
     }
 
     fn is_separator(&self, byte: u8) -> bool {
-        is_space(byte) || matches!(byte, b',' | b';')
+        self.decimal.is_separator(byte)
     }
 
     fn columns(&self, bytes: &[u8]) -> Vec<Column> {
         let row = self.sample(bytes).next().unwrap_or_default();
-        let names = self.names.map_or(&b""[..], |names| names.of(bytes));
-        let mut names = Values::new(names).map(|name| {
-            let name = String::from_utf8_lossy(name.of(names)).into_owned();
-            name.trim_matches(['"', '\'']).to_owned()
-        });
+        let names = self.column_names(bytes);
         let mut columns: Vec<Column> = Vec::new();
-        for (index, value) in Values::new(row).enumerate() {
-            let name = names.next().filter(|name| !name.is_empty());
+        for (index, (value, name)) in Values::new(row, self.decimal).zip(names).enumerate() {
             let value = value.of(row);
-            let mut name = name.unwrap_or_else(|| format!("Column {}", index + 1));
+            let mut name = if name.is_empty() {
+                format!("Column {}", index + 1)
+            } else {
+                name
+            };
             // Two columns of one name are told apart by where they stand.
             if columns.iter().any(|column| column.name == name) {
                 name = format!("{name} (column {})", index + 1);
             }
-            let is_number = value.is_empty() || parse(value).is_some();
+            let is_number = value.is_empty() || self.table.types[0].read(value).is_some();
             let kind = if is_number {
                 ColumnKind::Decimal
             } else {
@@ -380,6 +311,10 @@ impl Layout for XyzLayout {
             columns.push(Column { name, index, kind });
         }
         columns
+    }
+
+    fn as_text(&self) -> Option<&XyzLayout> {
+        Some(self)
     }
 
     fn column_of(&self, slot: usize) -> Option<usize> {
@@ -396,7 +331,11 @@ impl Layout for XyzLayout {
     }
 
     fn unnamed_colors(&self, bytes: &[u8]) -> Option<[usize; 3]> {
-        self.sample_of_colors(bytes)
+        // Names that say nothing of colors mean that there are none.
+        if self.by != ColumnsBy::Look || self.names.is_some() {
+            return None;
+        }
+        self.look(bytes).colors
     }
 
     // Without names nobody would know what the columns are, nor which are a normal's.
@@ -413,130 +352,6 @@ impl Layout for XyzLayout {
     ) -> Result<(), WriteError> {
         let edits = self.header_edits(bytes, content.normals.has_confidence());
         rewrite(self, bytes, &edits, content.normals, out, progress)
-    }
-}
-
-/// Whether the words of a comment are the names of columns, rather than prose in which x, y and z occur: these stand side
-/// by side, only usual names stand before them, and every word could be a name.
-fn are_names(comment: &[u8]) -> bool {
-    const BEFORE: &str =
-        "id idx index no nr n pointid point_id t time red green blue r g b intensity class label nx ny nz";
-    const PROSE: &str = "a an and are as at by each for from in is of on per the to with";
-    let words: Vec<String> = Values::new(comment).map(|word| plain_name(word.of(comment))).collect();
-    let is_one_of = |word: &String, list: &str| list.split(' ').any(|listed| listed == word);
-    let is_name = |word: &String| {
-        let may_hold = |byte: u8| byte.is_ascii_alphanumeric() || b"_-.()[]/%#".contains(&byte) || !byte.is_ascii();
-        word.bytes().all(may_hold) && !word.ends_with('.') && !is_one_of(word, PROSE)
-    };
-    let are_coordinates = |three: &[String]| ["x", "y", "z"].iter().all(|axis| three.iter().any(|word| word == axis));
-    words
-        .windows(3)
-        .position(are_coordinates)
-        .is_some_and(|first| words[..first].iter().all(|word| is_one_of(word, BEFORE)) && words.iter().all(is_name))
-}
-
-/// A name without quotes, in lower case.
-fn plain_name(name: &[u8]) -> String {
-    name.iter()
-        .filter(|byte| !matches!(byte, b'"' | b'\''))
-        .map(|byte| byte.to_ascii_lowercase() as char)
-        .collect()
-}
-
-/// The columns of a text without names and normals.
-const UNNAMED: [Option<usize>; N_VALUES] = [Some(0), Some(1), Some(2), None, None, None, None, None];
-
-/// The columns of values by their names; `None` without x, y and z.
-fn columns_by_name(line: &[u8]) -> Option<[Option<usize>; N_VALUES]> {
-    let names: Vec<String> = Values::new(line).map(|name| plain_name(name.of(line))).collect();
-    let find = |wanted: &[&str]| names.iter().position(|name| wanted.contains(&name.as_str()));
-    let [x, y, z] = [find(&["x"])?, find(&["y"])?, find(&["z"])?];
-    let normal = (|| {
-        Some([
-            find(&["nx", "normal_x", "normalx"])?,
-            find(&["ny", "normal_y", "normaly"])?,
-            find(&["nz", "normal_z", "normalz"])?,
-        ])
-    })();
-    let [nx, ny, nz] = normal.map_or([None; 3], |columns| columns.map(Some));
-    let [confidence, oriented] = [find(&["confidence"]), find(&["oriented"])];
-    Some([Some(x), Some(y), Some(z), nx, ny, nz, confidence, oriented])
-}
-
-/// Whether a line holds no point: a comment or nothing.
-fn is_skipped(line: &[u8]) -> bool {
-    let content = line.trim_ascii_start();
-    content.is_empty() || content.starts_with(b"#") || content.starts_with(b"//")
-}
-
-/// The lines of a text, without their ends.
-#[derive(Clone, Copy)]
-struct Lines<'a> {
-    bytes: &'a [u8],
-    line_end: u8,
-    at: usize,
-}
-
-impl Iterator for Lines<'_> {
-    type Item = Span;
-
-    fn next(&mut self) -> Option<Span> {
-        if self.at == self.bytes.len() {
-            return None;
-        }
-        let start = self.at;
-        let rest = &self.bytes[start..];
-        let length = memchr::memchr(self.line_end, rest);
-        self.at = length.map_or(self.bytes.len(), |length| start + length + 1);
-        let line = &rest[..length.unwrap_or(rest.len())];
-        let line = line.strip_suffix(b"\r").unwrap_or(line);
-        Some(Span {
-            start,
-            end: start + line.len(),
-        })
-    }
-}
-
-/// The values of a line: separated by spaces, or by one comma or semicolon with spaces around it.
-struct Values<'a> {
-    line: &'a [u8],
-    at: usize,
-}
-
-impl<'a> Values<'a> {
-    fn new(line: &'a [u8]) -> Self {
-        Self { line, at: 0 }
-    }
-
-    fn skip_spaces(&mut self) {
-        while self.at < self.line.len() && is_space(self.line[self.at]) {
-            self.at += 1;
-        }
-    }
-}
-
-impl Iterator for Values<'_> {
-    type Item = Span;
-
-    #[inline]
-    fn next(&mut self) -> Option<Span> {
-        self.skip_spaces();
-        if self.at == self.line.len() {
-            return None;
-        }
-        let start = self.at;
-        let is_end = |byte: &u8| is_space(*byte) || matches!(byte, b',' | b';');
-        let end = start
-            + self.line[start..]
-                .iter()
-                .position(is_end)
-                .unwrap_or(self.line.len() - start);
-        self.at = end;
-        self.skip_spaces();
-        if matches!(self.line.get(self.at), Some(b',' | b';')) {
-            self.at += 1;
-        }
-        Some(Span { start, end })
     }
 }
 
@@ -588,7 +403,7 @@ impl Rows for XyzRows<'_> {
             }
             let mut spans = Spans::default();
             let mut n_columns = 0;
-            for (value, slot) in Values::new(content).zip(&self.slots) {
+            for (value, slot) in Values::new(content, self.layout.decimal).zip(&self.slots) {
                 n_columns += 1;
                 if let Some(slot) = slot {
                     spans[*slot] = Span {
