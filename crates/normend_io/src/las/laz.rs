@@ -423,12 +423,7 @@ impl Packing {
             .build();
         let mut record = Vec::new();
         vlr.write_to(&mut record).map_err(|error| unknown(error.into()))?;
-        // LASzip knows one version of these.
-        for item in record[ITEMS..].chunks_exact_mut(ITEM) {
-            if item[0] == 9 {
-                item[4] = 1;
-            }
-        }
+        settle_waveforms(&mut record);
         Ok(Self {
             record,
             chunks: ChunkSizes::All(USUAL_CHUNK),
@@ -452,6 +447,7 @@ impl Packing {
             }
             record[12..16].copy_from_slice(&(*size as u32).to_le_bytes());
         }
+        settle_waveforms(record);
         if n_added == 0 {
             return packing;
         }
@@ -471,6 +467,16 @@ impl Packing {
             }
         }
         packing
+    }
+}
+
+/// LASzip knows version 1 of packed waveforms alone, also where the other items have version 2, and `laz` packs them in one way.
+fn settle_waveforms(record: &mut [u8]) {
+    const WAVEFORMS: u8 = 9;
+    for item in record[ITEMS..].chunks_exact_mut(ITEM) {
+        if item[0] == WAVEFORMS {
+            item[4] = 1;
+        }
     }
 }
 
