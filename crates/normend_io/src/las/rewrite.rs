@@ -17,6 +17,8 @@ use crate::value::{Scalar, ValueType};
 
 /// What new extra bytes are called, by component of the normal.
 pub(super) const NORMAL_FIELDS: [&str; 3] = ["NormalX", "NormalY", "NormalZ"];
+/// The same where one of these names is taken by something else.
+const OTHER_NORMAL_FIELDS: [[&str; 3]; 2] = [["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]];
 /// What they are, for who reads the file's descriptions.
 pub(super) const ABOUT_NORMAL: &str = "unit normal, oriented";
 /// The same for confidence and its flag.
@@ -54,6 +56,13 @@ impl Plan {
         let Some(normals) = normals else {
             return plan;
         };
+        // There may be one of a name that cannot hold it; the three of a normal are called in one way.
+        let is_taken = |name: &str| (layout.extra.fields.iter()).any(|field| field.name.eq_ignore_ascii_case(name));
+        let is_free = |names: &&[&str; 3]| !names.iter().any(|name| is_taken(name));
+        let normal_names = OTHER_NORMAL_FIELDS.iter().find(is_free);
+        let normal_names = normal_names
+            .filter(|_| !is_free(&&NORMAL_FIELDS))
+            .unwrap_or(&NORMAL_FIELDS);
         let mut is_described = false;
         let end = if normals.has_confidence() { SIDE.end } else { NORMAL.end };
         for slot in NORMAL.start..end {
@@ -77,17 +86,11 @@ impl Plan {
                 is_described = true;
             }
             let (name, scalar, about) = if NORMAL.contains(&slot) {
-                (NORMAL_FIELDS[slot - NORMAL.start], Scalar::Float, ABOUT_NORMAL)
+                (normal_names[slot - NORMAL.start], Scalar::Float, ABOUT_NORMAL)
             } else {
                 SIDE_FIELDS[slot - SIDE.start]
             };
-            // There may be one of this name that cannot hold it.
-            let is_taken = layout
-                .extra
-                .fields
-                .iter()
-                .any(|field| field.name.eq_ignore_ascii_case(name));
-            let name = if is_taken {
+            let name = if is_taken(name) {
                 format!("{name}_normend")
             } else {
                 name.to_owned()
