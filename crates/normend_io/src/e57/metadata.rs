@@ -23,8 +23,10 @@ pub(super) const NORMALS_PAGE_URI: &str = "http://www.libe57.org/E57_EXT_surface
 /// The namespace of what E57 has no name for.
 pub(super) const OWN_URI: &str = "urn:normend:e57:1";
 
-/// The most tags and attributes of an XML section, which take a hundred bytes each while it is read: those of thousands of scans.
-const MOST_XML_PARTS: usize = 600_000;
+/// The most tags and attributes of an XML section in a small file, each of which takes some hundred bytes while it is read.
+const MOST_XML_PARTS: usize = 150_000;
+/// And one more for so many bytes of the file: scans of thousands of points need no more.
+const BYTES_A_PART: usize = 64;
 /// The most attributes of a tag, which are compared each with each.
 const MOST_ATTRIBUTES: usize = 256;
 /// The most declarations of namespaces, which each tag within inherits.
@@ -73,7 +75,7 @@ pub(super) struct Metadata {
 }
 
 /// Refuses XML that would take more memory or time than its size says.
-fn check_size(xml: &[u8]) -> Result<(), Broken> {
+fn check_size(xml: &[u8], n_bytes: usize) -> Result<(), Broken> {
     let n_parts = memchr::memchr2_iter(b'<', b'=', xml).count();
     let n_namespaces = memchr::memmem::find_iter(xml, b"xmlns").count();
     let most_attributes = xml
@@ -81,7 +83,8 @@ fn check_size(xml: &[u8]) -> Result<(), Broken> {
         .filter(|tag| !tag.starts_with(b"!"))
         .map(|tag| memchr::memchr_iter(b'=', tag).count())
         .max();
-    if n_parts > MOST_XML_PARTS || n_namespaces > MOST_NAMESPACES || most_attributes > Some(MOST_ATTRIBUTES) {
+    let most_parts = MOST_XML_PARTS + n_bytes / BYTES_A_PART;
+    if n_parts > most_parts || n_namespaces > MOST_NAMESPACES || most_attributes > Some(MOST_ATTRIBUTES) {
         return Err(Broken::whole(format!(
             "the XML section is larger than Normend reads ({n_parts} tags and attributes, {n_namespaces} namespaces): split the file"
         )));
@@ -102,7 +105,10 @@ fn words_of(error: &e57::Error) -> String {
 /// Reads the XML section of a file, whose header has been checked.
 pub(super) fn read(bytes: &[u8]) -> Result<Metadata, Broken> {
     let unreadable = |error: e57::Error| Broken::whole(format!("{}: export the file again", words_of(&error)));
-    check_size(&E57Reader::raw_xml(Cursor::new(bytes)).map_err(unreadable)?)?;
+    check_size(
+        &E57Reader::raw_xml(Cursor::new(bytes)).map_err(unreadable)?,
+        bytes.len(),
+    )?;
     let reader = E57Reader::new(Cursor::new(bytes)).map_err(unreadable)?;
     let xml = reader.xml().to_owned();
     let document = parse(&xml)?;
