@@ -105,6 +105,12 @@ impl FileFormat {
         }
     }
 
+    /// Whether a new file holds rows without finite coordinates, which are no points.
+    pub(crate) fn can_hold_left_out(self) -> bool {
+        // Coordinates of LAS are whole numbers of steps, and most programs that read OBJ know no NaN.
+        !matches!(self, Self::Las | Self::Obj)
+    }
+
     /// Writes a new file, from which [`Self::limit`] has dropped what the format cannot hold.
     pub(crate) fn write_new(
         self,

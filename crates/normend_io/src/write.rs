@@ -69,6 +69,13 @@ impl Scan {
             .collect();
         losses.extend(format.limit(&mut file, path));
         losses.extend(self.lost_scans(format));
+        if self.n_left_out > 0 && !format.can_hold_left_out() {
+            let rows = if self.n_left_out == 1 { "row" } else { "rows" };
+            losses.push(Loss {
+                what: format!("{} {rows} without a place", self.n_left_out),
+                why: format!("{} holds points alone", format.label()),
+            });
+        }
         Ok(losses)
     }
 
@@ -143,7 +150,9 @@ impl Scan {
             // A format may have two forms, one of them packed.
             return self.place(path, options, |out| {
                 let file = &self.file;
-                file.layout.copy(&file.bytes, out, progress).unwrap_or_else(|| Err(copied()))
+                file.layout
+                    .copy(&file.bytes, out, progress)
+                    .unwrap_or_else(|| Err(copied()))
             });
         }
         let rows = self.rows.as_ref().map(|rows| rows.as_slice());
