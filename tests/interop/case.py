@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from plyfile import PlyData
 
-from clouds import CLOUDS, Cloud, of_columns, write_plain_ply
-from compare import FLOAT, SHORTEST, Kept, Outcome, compare, within
+from clouds import CLOUDS, COLORS, Cloud, of_columns, write_plain_ply
+from compare import FLOAT, SHORTEST, Kept, Outcome, compare, same, within
 
 NORMEND = os.environ.get("NORMEND", "normend")
 
@@ -193,6 +193,8 @@ class Case:
 # What comes through text and through a PLY that Normend makes of another format: all.
 TEXT = Kept(points=SHORTEST, normals=SHORTEST, others=SHORTEST)
 PLY = Kept(normals=FLOAT, others=SHORTEST)
+# What comes through an OBJ that Normend makes.
+OBJ = Kept(points=SHORTEST, normals=SHORTEST, values=same(COLORS), leaves_out_holes=True)
 # Normals that are turned with a scan, and back.
 TURNED = within(1e-6)
 

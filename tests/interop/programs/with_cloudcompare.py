@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from case import TEXT, Case, read_ply, run
+from case import OBJ, TEXT, Case, read_ply, run
 from clouds import COLORS, Cloud, write_plain_ply
 from compare import Held, Kept, same, within
 
@@ -85,7 +85,7 @@ CASES = [
         format="OBJ",
         extension=".obj",
         read=read,
-        made=Kept(leaves_out_holes=True),
+        made=OBJ,
         reads=Kept(points=within(1e-5), normals=NORMALS, remark=ROUNDS),
         only=(),
     ),

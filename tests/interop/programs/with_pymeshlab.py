@@ -3,7 +3,7 @@
 import numpy as np
 import pymeshlab
 
-from case import TEXT, Case
+from case import OBJ, TEXT, Case
 from clouds import COLORS, Cloud, with_colors, write_plain_ply
 from compare import FLOAT, Kept, same, within
 
@@ -34,6 +34,12 @@ def write(cloud: Cloud, path) -> None:
 
 
 HOLES = {"holes": "it gives places and normals of different rows"}
+
+
+def from_shares(values: dict) -> dict:
+    """Colors of shares of 1, as OBJ has them."""
+    return {name: np.round(of * 255) for name, of in values.items()}
+
 
 # One of 255 is lost where a share of 1 is cut off.
 CUT = {name: within(1.0) for name in COLORS}
@@ -71,7 +77,8 @@ CASES = [
             normals=None, values=CUT, remark="gives no normals to vertices without faces, cuts shares of color off"
         ),
         writes=Kept(points=within(1e-15), values=same(COLORS)),
-        made=Kept(values=same(COLORS), leaves_out_holes=True),
+        made=OBJ,
+        values_of=from_shares,
         without=HOLES,
     ),
     Case(
