@@ -194,16 +194,7 @@ pub(super) fn rewrite(
     let mut before = head.finish(stride, packing.is_some())?;
     out.write(&before)?;
 
-    let after_rows = write_rows(
-        layout,
-        bytes,
-        &plan,
-        normals,
-        packing.as_ref(),
-        before.len() as u64,
-        out,
-        progress,
-    )?;
+    let after_rows = write_rows(layout, bytes, &plan, normals, packing.as_ref(), out, progress)?;
     let dropped: Vec<&Record> = layout
         .head
         .records
@@ -234,7 +225,6 @@ fn write_rows(
     plan: &Plan,
     normals: Option<RowNormals<'_>>,
     packing: Option<&Packing>,
-    start: u64,
     out: &mut Output<'_>,
     progress: &dyn Progress,
 ) -> Result<u64, WriteError> {
@@ -257,7 +247,7 @@ fn write_rows(
     match packing {
         None => {
             for_each_part(table.n_parts(), progress, make, |rows| out.write(rows))?;
-            Ok(start + (table.n_rows * plan.stride) as u64)
+            out.file.stream_position().map_err(WriteError::io(out.path))
         }
         Some(packing) => {
             let mut packer = Packer::new(packing, plan.stride, out)?;
