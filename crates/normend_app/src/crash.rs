@@ -206,7 +206,7 @@ pub(crate) fn restart() -> Result<(), String> {
     let started = std::env::current_exe().and_then(|program| successor(&program, &run).spawn());
     started
         .map(drop)
-        .map_err(|error| format!("it cannot be started again: {error}"))
+        .map_err(|error| format!("it cannot be started again: {}", normend_io::io_words(&error)))
 }
 
 /// What starts `program` as the one that goes on with the scan of `run` and restores without asking.

@@ -91,7 +91,10 @@ impl<T: Send + 'static> Job<T> {
             progress.ctx.request_repaint();
         });
         if let Err(error) = spawned {
-            let words = format!("The system gives no thread for this work: {error}.");
+            let words = format!(
+                "The system gives no thread for this work: {}.",
+                normend_io::io_words(&error)
+            );
             // The receiver is in this very function, so sending cannot fail.
             let _ = failure.send(Err(JobError::Failed(words)));
         }

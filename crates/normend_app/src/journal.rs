@@ -156,7 +156,8 @@ impl Journal {
             .spawn(move || keep_synced(&shared, &asked));
         if let Err(error) = &thread {
             lock(&out).news = Some(News::Failing(format!(
-                "the system gives no thread to sync them ({error})"
+                "the system gives no thread to sync them ({})",
+                normend_io::io_words(error)
             )));
         }
         Self {
@@ -351,7 +352,7 @@ fn in_words(error: &io::Error) -> String {
         io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
             "the folder cannot be written to: check its permissions".to_owned()
         }
-        _ => error.to_string(),
+        _ => normend_io::io_words(error),
     }
 }
 

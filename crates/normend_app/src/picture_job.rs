@@ -135,8 +135,13 @@ impl App {
                 Ok(Made::Files(path))
             }
             PictureTarget::Turntable { folder, n_frames } => {
-                std::fs::create_dir_all(&folder)
-                    .map_err(|error| JobError::Failed(format!("{} cannot be made: {error}.", folder.display())))?;
+                std::fs::create_dir_all(&folder).map_err(|error| {
+                    JobError::Failed(format!(
+                        "{} cannot be made: {}.",
+                        folder.display(),
+                        normend_io::io_words(&error)
+                    ))
+                })?;
                 let mut maker = maker;
                 for frame in 0..n_frames {
                     progress.stage(&format!("Picture {} of {n_frames}", frame + 1));

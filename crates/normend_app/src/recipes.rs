@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use egui::Ui;
+use normend_io::io_words;
 use normend_io::recipe::{self, End, Recipe};
 
 use crate::app::App;
@@ -173,7 +174,8 @@ impl App {
             restore::Decision::Remove => {
                 let offer = self.session.as_mut().and_then(|session| session.offers.pop_front());
                 if let Some(Err(error)) = offer.map(Offer::remove) {
-                    self.messages.error(format!("The journal was not removed: {error}."));
+                    self.messages
+                        .error(format!("The journal was not removed: {}.", io_words(&error)));
                 }
             }
             restore::Decision::Keep => {
@@ -379,7 +381,8 @@ impl App {
                     self.messages.info(format!("Saved the recipe to {}.", path.display()));
                     // It is kept under its own name now.
                     if let Some(Err(error)) = offer.map(|offer| offer.remove()) {
-                        self.messages.error(format!("The journal was not removed: {error}."));
+                        self.messages
+                            .error(format!("The journal was not removed: {}.", io_words(&error)));
                     }
                     if closes {
                         self.ctx.send_viewport_cmd(egui::ViewportCommand::Close);

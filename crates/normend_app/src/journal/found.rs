@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 use normend_core::EditKind;
+use normend_io::io_words;
 use normend_io::recipe::{self, End, Reading, ScanIdentity};
 
 use super::{EXTENSION, stem};
@@ -89,7 +90,7 @@ impl Offer {
         let mut bytes = Vec::new();
         file.seek(SeekFrom::Start(0))
             .and_then(|_| file.read_to_end(&mut bytes))
-            .map_err(|error| error.to_string())?;
+            .map_err(|error| io_words(&error))?;
         normend_io::write_bytes(&copy, &bytes).map_err(|error| error.to_string())?;
         Ok(copy)
     }
@@ -176,8 +177,13 @@ enum Taken {
 
 /// Locks and reads a journal.
 fn take(path: &Path, scan: &ScanIdentity, deadline: Option<Instant>) -> Result<Taken, String> {
-    let unreadable =
-        |error: &dyn std::fmt::Display| format!("A journal of this scan cannot be used. {}: {error}.", path.display());
+    let unreadable = |error: &std::io::Error| {
+        format!(
+            "A journal of this scan cannot be used. {}: {}.",
+            path.display(),
+            io_words(error)
+        )
+    };
     let mut file = OpenOptions::new()
         .read(true)
         .write(true)

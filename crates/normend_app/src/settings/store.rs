@@ -9,6 +9,7 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use normend_io::io_words;
 use serde::Deserialize;
 use toml::{Table, Value};
 
@@ -83,8 +84,12 @@ impl SettingsStore {
         }
         let before = std::mem::replace(&mut self.saved, self.settings.clone());
         let Some(folder) = &self.folder else { return Ok(()) };
-        write(folder, &before, &self.settings)
-            .map_err(|error| format!("The settings could not be saved in {}: {error}.", folder.display()))
+        write(folder, &before, &self.settings).map_err(|error| {
+            let reason = error
+                .downcast_ref::<io::Error>()
+                .map_or_else(|| error.to_string(), io_words);
+            format!("The settings could not be saved in {}: {reason}.", folder.display())
+        })
     }
 }
 
@@ -146,7 +151,7 @@ fn read(folder: &Path) -> (Settings, Option<String>) {
             }
             // The next change writes the file, so what the user wrote is kept beside it.
             let copied = fs::read(&file)
-                .map_err(|error| error.to_string())
+                .map_err(|error| io_words(&error))
                 .and_then(|bytes| normend_io::write_bytes(&aside, &bytes).map_err(|error| error.to_string()));
             let kept = match copied {
                 Ok(()) => format!("a copy is {}", aside.display()),
@@ -162,15 +167,16 @@ fn read(folder: &Path) -> (Settings, Option<String>) {
         Err(Unread::Missing) => (Settings::default(), None),
         Err(Unread::Unreadable(error)) => {
             let problem = format!(
-                "The settings in {} cannot be read ({error}); defaults are used.",
-                file.display()
+                "The settings in {} cannot be read ({}); defaults are used.",
+                file.display(),
+                io_words(&error)
             );
             (Settings::default(), Some(problem))
         }
         Err(Unread::NotUnderstood(reason)) => {
             let outcome = match fs::rename(&file, &aside) {
                 Ok(()) => format!("it is now {}", aside.display()),
-                Err(error) => format!("it could not be renamed: {error}"),
+                Err(error) => format!("it could not be renamed: {}", io_words(&error)),
             };
             let problem = format!(
                 "The settings in {} are not understood ({reason}); defaults are used, {outcome}.",
