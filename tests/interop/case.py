@@ -162,7 +162,7 @@ class Case:
             way = "it writes, we export, it reads"
             rows.append(self._row(way, self._they_read_theirs, kept, self.without, folder))
             if self.untouched and not rows[-1].faults:
-                rows[-1].values += f"; {self.untouched[0]}"
+                rows[-1].values = f"{rows[-1].values}; {self.untouched[0]}".removeprefix("–; ")
         return rows
 
     def _row(self, way: str, go, programs: list[Kept], without: dict[str, str], folder: Path) -> Row:

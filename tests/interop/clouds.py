@@ -108,3 +108,20 @@ def write_plain_ply(cloud: Cloud, path, encoding="binary_little_endian") -> None
             file.write("".join(" ".join(str(of) for of in row) + "\n" for row in rows).encode())
         else:
             file.write(rows.tobytes())
+
+
+def _mesh() -> tuple[Cloud, np.ndarray]:
+    """A wave of triangles, with normals of mixed sides."""
+    random = np.random.default_rng(5)
+    n = 12
+    x, y = np.meshgrid(np.arange(n) * 0.25, np.arange(n) * 0.25, indexing="ij")
+    positions = np.column_stack([x.ravel(), y.ravel(), np.sin(x).ravel()]).astype(np.float32)
+    normals = np.column_stack([-np.cos(x).ravel(), np.zeros(n * n), np.ones(n * n)])
+    normals *= (random.choice([-1, 1], n * n) / np.linalg.norm(normals, axis=1))[:, None]
+    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
+    lower = np.column_stack([corner, corner + n, corner + 1])
+    upper = np.column_stack([corner + 1, corner + n, corner + n + 1])
+    return Cloud(positions.astype(np.float64), normals.astype(np.float32)), np.concatenate([lower, upper])
+
+
+MESH, FACES = _mesh()

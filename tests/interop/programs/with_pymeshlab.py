@@ -2,9 +2,10 @@
 
 import numpy as np
 import pymeshlab
+from plyfile import PlyData, PlyElement
 
 from case import OBJ, TEXT, Case
-from clouds import COLORS, Cloud, with_colors, write_plain_ply
+from clouds import COLORS, FACES, MESH, Cloud, with_colors, write_plain_ply
 from compare import FLOAT, Kept, same, within
 
 
@@ -31,6 +32,27 @@ def write(cloud: Cloud, path) -> None:
     meshes.load_new_mesh(str(plain))
     options = {"save_vertex_normal": True, "save_vertex_color": True} if path.suffix == ".ply" else {}
     meshes.save_current_mesh(str(path), **options)
+
+
+def write_mesh(cloud: Cloud, path) -> None:
+    """Writes the mesh, from a PLY of plyfile: a mesh that is made of arrays gets normals of its own."""
+    plain = path.with_suffix(".plain.ply")
+    vertex = np.empty(len(cloud), [(name, "f4") for name in ("x", "y", "z", "nx", "ny", "nz")])
+    for axis, name in enumerate("xyz"):
+        vertex[name], vertex[f"n{name}"] = cloud.positions[:, axis], cloud.normals[:, axis]
+    face = np.empty(len(FACES), [("vertex_indices", "i4", (3,))])
+    face["vertex_indices"] = FACES
+    PlyData([PlyElement.describe(vertex, "vertex"), PlyElement.describe(face, "face")]).write(plain)
+    meshes = pymeshlab.MeshSet()
+    meshes.load_new_mesh(str(plain))
+    meshes.save_current_mesh(str(path), save_vertex_normal=True)
+
+
+def faces_untouched(_theirs, ours) -> list[str]:
+    """What differs between the faces of our file and those of the mesh."""
+    meshes = pymeshlab.MeshSet()
+    meshes.load_new_mesh(str(ours))
+    return [] if np.array_equal(meshes.current_mesh().face_matrix(), FACES) else ["faces differ"]
 
 
 HOLES = {"holes": "it gives places and normals of different rows"}
@@ -90,5 +112,19 @@ CASES = [
         reads=Kept(values=same(COLORS), leaves_out_holes=True),
         writes=Kept(points=FLOAT, values=same(COLORS), leaves_out_holes=True, remark="writes floats"),
         made=Kept(values=same(COLORS)),
+    ),
+    *(
+        Case(
+            program="pymeshlab",
+            format=f"{name}, mesh",
+            extension=extension,
+            clouds={"mesh": MESH},
+            read=read,
+            write=write_mesh,
+            writes=Kept(points=within(1e-15), normals=within(1e-15)),
+            is_made=False,
+            untouched=("faces", faces_untouched),
+        )
+        for name, extension in (("PLY", ".ply"), ("OBJ", ".obj"))
     ),
 ]

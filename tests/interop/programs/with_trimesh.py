@@ -4,8 +4,8 @@ import numpy as np
 import trimesh
 
 from case import OBJ, Case
-from clouds import COLORS, Cloud, of_columns, with_colors
-from compare import FLOAT, SAME, Kept, same
+from clouds import COLORS, FACES, MESH, Cloud, of_columns, with_colors
+from compare import FLOAT, SAME, Kept, same, within
 
 
 def read(path) -> Cloud:
@@ -28,6 +28,26 @@ def write(cloud: Cloud, path) -> None:
     """Writes positions and colors."""
     trimesh.PointCloud(cloud.positions, colors=cloud.colors()).export(path)
 
+
+def read_mesh(path) -> Cloud:
+    """Reads the vertices of a mesh and their normals."""
+    mesh = trimesh.load(path, process=False)
+    return Cloud(np.asarray(mesh.vertices), np.asarray(mesh.vertex_normals))
+
+
+def write_mesh(cloud: Cloud, path) -> None:
+    """Writes the mesh."""
+    mesh = trimesh.Trimesh(cloud.positions, FACES, vertex_normals=cloud.normals, process=False)
+    options = {"include_normals": True} if path.suffix == ".obj" else {"vertex_normal": True}
+    mesh.export(path, **options)
+
+
+def faces_untouched(_theirs, ours) -> list[str]:
+    """What differs between the faces of our file and those of the mesh."""
+    return [] if np.array_equal(trimesh.load(ours, process=False).faces, FACES) else ["faces differ"]
+
+
+EIGHT = within(1e-8)
 
 CASES = [
     Case(
@@ -52,5 +72,23 @@ CASES = [
         read=read_obj,
         reads=Kept(normals=None, values=same(COLORS), remark="gives no normals to vertices without faces"),
         made=OBJ,
+    ),
+    *(
+        Case(
+            program="trimesh",
+            format=f"{name}, mesh",
+            extension=extension,
+            clouds={"mesh": MESH},
+            read=read_mesh,
+            write=write_mesh,
+            reads=kept,
+            writes=kept,
+            is_made=False,
+            untouched=("faces", faces_untouched),
+        )
+        for name, extension, kept in (
+            ("PLY", ".ply", Kept()),
+            ("OBJ", ".obj", Kept(points=EIGHT, normals=EIGHT, remark="writes eight digits after the point")),
+        )
     ),
 ]
