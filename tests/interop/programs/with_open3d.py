@@ -50,6 +50,14 @@ def write_text(cloud: Cloud, path) -> None:
     by_its_name.rename(path)
 
 
+def write_pts(cloud: Cloud, path) -> None:
+    """Writes positions and colors."""
+    legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.positions))
+    legacy.colors = o3d.utility.Vector3dVector(cloud.colors() / 255)
+    if not o3d.io.write_point_cloud(str(path), legacy):
+        raise RuntimeError("Open3D did not write the file")
+
+
 def splats() -> Cloud:
     """Gaussian splats: colors as harmonics, opacity, size, turn."""
     random = np.random.default_rng(3)
@@ -130,6 +138,15 @@ CASES = [
         made=TEXT,
         only=(),
         writes=Kept(points=within(1e-10), normals=within(1e-7), remark="writes ten digits after the point"),
+    ),
+    Case(
+        program="Open3D",
+        format="PTS",
+        extension=".pts",
+        write=write_pts,
+        writes=Kept(
+            points=within(1e-10), normals=None, values=same(COLORS), remark="writes ten digits after the point"
+        ),
     ),
     Case(
         program="Open3D",

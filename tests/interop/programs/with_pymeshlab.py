@@ -91,6 +91,15 @@ CASES = [
     ),
     Case(
         program="pymeshlab",
+        format="PTS",
+        extension=".pts",
+        read=read,
+        made=TEXT,
+        only=(),
+        without=HOLES,
+    ),
+    Case(
+        program="pymeshlab",
         format="OBJ",
         extension=".obj",
         read=read,
