@@ -12,7 +12,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::PointCloud;
-use crate::evidence::Station;
+use crate::evidence::{Station, Track};
 
 /// The places of a cloud in which several points stand, and the others.
 pub(crate) struct Copies {
@@ -154,6 +154,11 @@ impl Copies {
                 normals.find(is_usable).unwrap_or(Vec3::ZERO)
             })
             .collect()
+    }
+
+    /// Where a moving scanner measured the places: where it did the first point of each.
+    pub fn track(&self, track: &Track) -> Track {
+        track.of((0..self.places.n_places() as u32).map(|place| self.places.first(place)))
     }
 
     /// The places that each scanner measured: those whose first point it did.

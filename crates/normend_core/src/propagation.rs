@@ -199,6 +199,10 @@ pub struct Propagation {
     pub evidence: Option<Arc<Evidence>>,
     /// The place that all points were scanned from, where [`SideRule::Automatic`] found one.
     pub found_station: Option<FoundStation>,
+    /// The places of the scanner that it was made with.
+    pub stations: Arc<[Station]>,
+    /// Whether it was made with the way of a scanner that moved.
+    pub has_track: bool,
     /// Wall seconds of each stage.
     pub seconds: Vec<(Stage, f64)>,
 }
@@ -236,14 +240,19 @@ impl Propagation {
             known.given.map(|given| copies.given(given)),
             copies.stations(known.stations),
         );
+        let track = known.track.map(|track| copies.track(track));
         let by_place = Known {
             given: given.as_deref(),
             stations: &stations,
+            track: track.as_ref(),
             viewpoints: known.viewpoints,
         };
         let found = Self::of_distinct(&copies.distinct, by_place, parameters, progress)?;
         let kept = known.given.filter(|_| parameters.start == Start::Keep);
-        Ok(found.with_copies(cloud, &copies, kept))
+        Ok(Self {
+            stations: known.stations.into(),
+            ..found.with_copies(cloud, &copies, kept)
+        })
     }
 
     /// [`Self::new`] for points each of which has a place of its own.
@@ -316,7 +325,7 @@ impl Propagation {
             initially_turned.set(root as usize, turned);
         }
         let mut decided = Vec::new();
-        let asks_sources = parameters.rule == SideRule::Automatic && known.stations.is_empty();
+        let asks_sources = parameters.rule == SideRule::Automatic && !known.has_scanner();
         if given.is_none() && !asks_sources {
             progress.stage("Looking for the right side");
             let mut clues = Clues::new(cloud, &normals, &splat_radii);
@@ -353,6 +362,8 @@ impl Propagation {
             patches: None,
             evidence: None,
             found_station: None,
+            stations: known.stations.into(),
+            has_track: known.track.is_some(),
             seconds: clock.seconds,
         })
     }
@@ -378,18 +389,19 @@ impl Propagation {
         clock.finish(Stage::Normals);
 
         progress.stage("Looking at the sides");
-        let found_station = if parameters.rule == SideRule::Automatic && known.stations.is_empty() {
+        let found_station = if parameters.rule == SideRule::Automatic && !known.has_scanner() {
             evidence::find_station(cloud, &neighbors, &unoriented.normals, &Part::new(progress, 0.4..0.45))?
         } else {
             None
         };
-        let viewpoints = known.viewpoints;
+        let (viewpoints, stations, has_track) = (known.viewpoints, known.stations, known.track.is_some());
         let station = found_station.map(|found| Station {
             points: 0..cloud.n_points() as u32,
             position: found.position,
         });
         let known = &Known {
             stations: station.as_ref().map_or(known.stations, slice::from_ref),
+            track: known.track,
             // The file's normals are asked only where the user trusts them.
             given: known.given.filter(|_| parameters.rule == SideRule::Given),
             viewpoints,
@@ -453,6 +465,8 @@ impl Propagation {
             sides: decided,
             evidence: Some(Arc::new(found.evidence)),
             found_station,
+            stations: stations.into(),
+            has_track,
             seconds: clock.seconds,
         })
     }

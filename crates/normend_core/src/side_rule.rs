@@ -123,17 +123,17 @@ impl<'a> Clues<'a> {
             cloud, normals, radii, ..
         } = *self;
         match rule {
-            SideRule::Automatic | SideRule::TowardScanner if self.scanner.is_none() && !known.stations.is_empty() => {
-                self.scanner = Some(evidence::scanner(cloud, normals, known.stations));
+            SideRule::Automatic | SideRule::TowardScanner if self.scanner.is_none() && known.has_scanner() => {
+                self.scanner = Some(evidence::scanner(cloud, normals, known));
             }
             SideRule::Given if self.given.is_none() => {
                 self.given = known.given.map(|given| evidence::given(normals, given, 1.0));
             }
             SideRule::IntoRoom if self.inside.is_none() => {
-                let places = if known.stations.is_empty() {
-                    evidence::inside_places(cloud)
+                let places = if known.has_scanner() {
+                    known.places()
                 } else {
-                    known.stations.iter().map(|station| station.position).collect()
+                    evidence::inside_places(cloud)
                 };
                 let part = Part::new(progress, 0.0..0.5);
                 self.inside = Some(evidence::inside_views(cloud, radii, normals, &places, &part)?);

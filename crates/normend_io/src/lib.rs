@@ -36,6 +36,8 @@ mod ptx;
 
 mod scan;
 
+mod layers;
+
 mod rewrite;
 
 mod new_file;
@@ -52,6 +54,10 @@ mod write;
 
 mod stations;
 
+mod trajectory;
+
+mod scanner_places;
+
 pub mod recipe;
 
 #[cfg(test)]
@@ -61,7 +67,8 @@ pub use error::{Broken, Place, ReadError, WriteError, io_words};
 pub use format::FileFormat;
 pub use new_file::Loss;
 pub use save::{is_same_file, n_other_names};
-pub use scan::{ReadOptions, Scan, read, read_bytes, read_bytes_with, read_with};
+pub use scan::{Layer, ReadOptions, Scan, read, read_bytes, read_bytes_with, read_with};
+pub use scanner_places::{ScannerFiles, ScannerPlaces};
 pub use stations::{read_stations, stations_of_bytes};
 pub use write::{Positions, WriteOptions, write_bytes, write_points};
 pub use xyz::{ColumnsBy, TextColumns};

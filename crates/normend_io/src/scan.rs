@@ -1,8 +1,9 @@
-//! A scan: the points of a file, and the file itself so that it can be written again.
+//! A scan: the points of a file or of several, and the files themselves so that they can be written again.
 
 use std::fmt;
 use std::fs::{self, File};
 use std::io::{self, Read};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -19,19 +20,35 @@ use crate::table::{Layout, read_place, read_points};
 use crate::xyz::TextColumns;
 use crate::{e57, las, obj, pcd, ply, ptx, xyz};
 
-/// A scan as it was read: the points, and the file itself so that it can be written again with other normals.
+/// A scan as it was read: the points, and the files themselves so that they can be written again with other normals. Most scans are
+/// of one file; [`Scan::together`] makes one of several.
 #[derive(Clone)]
 pub struct Scan {
-    /// The finite points.
+    /// The finite points, file by file.
     pub cloud: Arc<PointCloud>,
-    /// The file's normals by point, of any length (zero where not finite), if it has any.
+    /// The files' normals by point, of any length (zero where not finite, or where a file has none), if any file has some.
     pub given_normals: Option<Arc<Vec<Vec3>>>,
-    /// The file's row of each point, ascending; `None` when every row is a point.
-    pub rows: Option<Arc<Vec<u32>>>,
-    /// Rows that are left out because a coordinate is not finite.
+    /// Rows that are left out because a coordinate is not finite, of all files.
     pub n_left_out: usize,
+    /// The files, in the order of their points; at least one.
+    pub(crate) layers: Vec<Layer>,
+}
+
+/// One of the files that a scan is made of, and which points are from it.
+#[derive(Clone)]
+pub struct Layer {
+    /// The file's name, without folders.
+    pub name: String,
+    /// Its points, which follow each other in the scan.
+    pub points: Range<u32>,
     /// What it was read as.
     pub format: FileFormat,
+    /// Whether it has normals.
+    pub has_normals: bool,
+    /// Rows that are left out because a coordinate is not finite.
+    pub n_left_out: usize,
+    /// The file's row of each of its points, ascending; `None` when every row is a point.
+    pub(crate) rows: Option<Arc<Vec<u32>>>,
     pub(crate) file: Arc<SourceFile>,
 }
 
@@ -151,12 +168,16 @@ fn read_content(
     let points = read_points(layout.as_ref(), &bytes, &Part::new(progress, 0.5..1.0)).map_err(in_file)?;
     let n_left_out = layout.table().n_rows - points.cloud.n_points();
     let (path, on_disk) = source.unzip();
-    Ok(Scan {
-        cloud: Arc::new(points.cloud),
-        given_normals: points.normals.map(Arc::new),
-        rows: points.rows.map(Arc::new),
-        n_left_out,
+    let layer = Layer {
+        name: Path::new(name)
+            .file_name()
+            .map_or_else(|| name.to_owned(), |name| name.to_string_lossy().into_owned()),
+        // A cloud has no more points than ids.
+        points: 0..points.cloud.n_points() as u32,
         format,
+        has_normals: points.normals.is_some(),
+        n_left_out,
+        rows: points.rows.map(Arc::new),
         file: Arc::new(SourceFile {
             path: path.map(Path::to_owned),
             bytes,
@@ -165,6 +186,12 @@ fn read_content(
             hash,
             on_disk: on_disk.unwrap_or_default(),
         }),
+    };
+    Ok(Scan {
+        cloud: Arc::new(points.cloud),
+        given_normals: points.normals.map(Arc::new),
+        n_left_out,
+        layers: vec![layer],
     })
 }
 
@@ -224,18 +251,25 @@ fn decode(format: FileFormat, bytes: Vec<u8>, options: &ReadOptions, progress: &
     })
 }
 
-fn hash(bytes: &[u8]) -> [u8; 32] {
+pub(crate) fn hash(bytes: &[u8]) -> [u8; 32] {
     *blake3::Hasher::new().update_rayon(bytes).finalize().as_bytes()
 }
 
-impl Scan {
+impl Layer {
+    /// Number of points. O(1).
+    pub fn n_points(&self) -> usize {
+        self.points.len()
+    }
+
     /// Where it was read from; `None` for [`read_bytes`].
     pub fn path(&self) -> Option<&PathBuf> {
         self.file.path.as_ref()
     }
 
-    /// Where `point` is, with all digits that the file has; `None` past the last point. Reads up to some thousand rows.
+    /// Where the scan's `point` is, with all digits that the file has; `None` when it is of another file. Reads up to some thousand
+    /// rows.
     pub fn coordinates(&self, point: u32) -> Option<DVec3> {
+        let point = point.checked_sub(self.points.start)?;
         let row = match &self.rows {
             Some(rows) => *rows.get(point as usize)?,
             None => point,
@@ -249,7 +283,7 @@ impl Scan {
         self.path().is_some_and(|path| self.file.on_disk.is_changed(path))
     }
 
-    /// What tells this scan from others in recipes; `name` is the file's without folders. That is the content that was read or, once
+    /// What tells this file from others in recipes; `name` is the file's without folders. That is the content that was read or, once
     /// that was written over, the one that took its place: it has the same points. The first call hashes the file's bytes on all
     /// processors; later ones cost nothing.
     pub fn identity(&self, name: &str) -> ScanIdentity {
@@ -265,8 +299,9 @@ impl Scan {
             }),
             n_bytes,
             hash,
-            n_points: self.cloud.n_points() as u64,
+            n_points: self.n_points() as u64,
             columns: self.columns_given().map(<[String]>::to_vec),
+            files: Vec::new(),
         }
     }
 
@@ -280,27 +315,44 @@ impl Scan {
         self.file.layout.as_text()?.given()
     }
 
-    /// Places that the file says its points were measured from, with the points of each, ascending. O(number of places).
+    /// Places that the file says its points were measured from, with the scan's points of each, ascending. O(number of places).
     pub fn stations(&self) -> Vec<Station> {
+        self.named_stations().into_iter().map(|(station, _)| station).collect()
+    }
+
+    /// [`Self::stations`] with the names of their scans, empty where the file gives none. O(number of places).
+    pub(crate) fn named_stations(&self) -> Vec<(Station, String)> {
         let table = self.file.layout.table();
         let end_of = |index: usize| table.frames.get(index + 1).map_or(table.n_rows, |next| next.first_row);
         let frames = table.frames.iter().enumerate();
         frames
             .filter_map(|(index, frame)| {
-                Some(Station {
+                let station = Station {
                     points: self.point_of_row(frame.first_row)..self.point_of_row(end_of(index)),
                     position: frame.station?,
-                })
+                };
+                Some((station, frame.name.clone()))
             })
             .collect()
     }
 
-    /// The point that a row of the file is or, when it is none, the next that follows. O(log n).
+    /// The scan's point that a row of the file is or, when it is none, the next that follows. O(log n).
     pub(crate) fn point_of_row(&self, row: usize) -> u32 {
-        match &self.rows {
+        let point = match &self.rows {
             Some(rows) => rows.partition_point(|&other| (other as usize) < row) as u32,
             None => row as u32,
-        }
+        };
+        self.points.start + point
+    }
+}
+
+impl fmt::Debug for Layer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Layer")
+            .field("name", &self.name)
+            .field("points", &self.points)
+            .field("format", &self.format)
+            .finish_non_exhaustive()
     }
 }
 
@@ -308,7 +360,7 @@ impl fmt::Debug for Scan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Scan")
             .field("n_points", &self.cloud.n_points())
-            .field("format", &self.format)
+            .field("layers", &self.layers)
             .finish()
     }
 }

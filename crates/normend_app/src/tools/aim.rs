@@ -265,6 +265,8 @@ mod tests {
             tree,
             evidence: None,
             found_station: None,
+            stations: Arc::default(),
+            has_track: false,
             seconds: Vec::new(),
             viewpoints: Arc::default(),
             votes: None,

@@ -92,21 +92,20 @@ pub(crate) fn gather_evidence(
     known: &Known<'_>,
     progress: &dyn Progress,
 ) -> Result<Evidence, Cancelled> {
-    // From one place one side of each surface is seen; lines and views from elsewhere meet others and would contradict.
-    if let [station] = known.stations
-        && station.points.start == 0
-        && station.points.end as usize >= cloud.n_points()
-    {
-        return Ok(evidence::scanner(cloud, normals, known.stations));
-    }
+    let seen = known.has_scanner().then(|| evidence::scanner(cloud, normals, known));
+    // The side that was seen is the right one of what was seen; lines and views from elsewhere meet others and would contradict.
+    let seen = match seen {
+        Some(seen) if seen.share_cast() >= MOSTLY_SEEN => return Ok(seen),
+        seen => seen,
+    };
     let n_axes = evidence::crossing_axes(cloud.n_points());
     let mut evidence = evidence::crossings(cloud, neighbors, radii, normals, n_axes, &Part::new(progress, 0.0..0.5))?;
     if cloud.n_points() <= FEW_POINTS || evidence.share_known() < MOSTLY_KNOWN {
         let part = Part::new(progress, 0.5..1.0);
         evidence.add(&evidence::outside_views(cloud, radii, normals, N_VIEWS, &part)?);
     }
-    if !known.stations.is_empty() {
-        evidence.add(&evidence::scanner(cloud, normals, known.stations));
+    if let Some(seen) = &seen {
+        evidence.add(seen);
     }
     if let Some(given) = known.given {
         // One look each: where they are wrong, what is seen outweighs them.
@@ -114,6 +113,9 @@ pub(crate) fn gather_evidence(
     }
     Ok(evidence)
 }
+
+/// Share of points that scanners saw from known places from which on nothing else is asked: the rest follows its neighbors.
+const MOSTLY_SEEN: f64 = 0.9;
 
 /// Points up to which views from outside take no time to speak of; they mend single points of sparse clouds.
 const FEW_POINTS: usize = 200_000;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::spread::{self, Anchor};
-use super::{Derived, Document, Edit, EditError, Mark, StateChange, check_direction, check_viewpoints};
+use super::{Derived, Document, Edit, EditError, Mark, StateChange, check_direction, check_scanner, check_viewpoints};
 use crate::sources::Origin;
 use crate::{PointSet, Source};
 
@@ -84,6 +84,13 @@ impl Document {
                 check_viewpoints(places)?;
                 StateChange {
                     viewpoints: Some(Arc::clone(places)).filter(|wanted| *wanted != self.state.viewpoints),
+                    ..StateChange::default()
+                }
+            }
+            Edit::SetScanner(scanner) => {
+                check_scanner(scanner)?;
+                StateChange {
+                    scanner: Some(scanner.clone()).filter(|wanted| *wanted != self.state.scanner),
                     ..StateChange::default()
                 }
             }

@@ -63,6 +63,8 @@ fn document(world: &World, voted: &BTreeMap<u32, bool>) -> Document {
         patches: has_pairs.then(|| Arc::new(crate::Patches::new(tree, &levels))),
         evidence: None,
         found_station: None,
+        stations: Arc::default(),
+        has_track: false,
         seconds: Vec::new(),
     });
     document

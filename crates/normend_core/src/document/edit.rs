@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+use super::ScannerChoice;
 use crate::propagation::VIEWS;
 use crate::sources::Origin;
 use crate::{Parameters, PointSet, Source};
@@ -67,6 +68,8 @@ pub enum Edit {
     /// These viewpoints vote for sources, in the cloud's own space; the usual ones when empty. Nothing turns before
     /// [`super::Document::install`].
     SetViewpoints(Arc<[Vec3]>),
+    /// These places of the scanner count. Nothing turns before [`super::Document::install`].
+    SetScanner(ScannerChoice),
 }
 
 /// Why points are flipped.
@@ -123,13 +126,15 @@ pub enum EditKind {
     SetParameters,
     /// [`Edit::SetViewpoints`].
     SetViewpoints,
+    /// [`Edit::SetScanner`].
+    SetScanner,
     /// The whole state of a recipe, or of older steps that are not told apart any more; recorded only.
     Recipe,
 }
 
 impl EditKind {
     /// All kinds.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::Mend,
         Self::TurnPatch,
         Self::Seen,
@@ -150,6 +155,7 @@ impl EditKind {
         Self::Accept,
         Self::SetParameters,
         Self::SetViewpoints,
+        Self::SetScanner,
         Self::Recipe,
     ];
 
@@ -176,6 +182,7 @@ impl EditKind {
             Self::Accept => "accept",
             Self::SetParameters => "parameters",
             Self::SetViewpoints => "viewpoints",
+            Self::SetScanner => "scanner",
             Self::Recipe => "recipe",
         }
     }
@@ -203,6 +210,7 @@ impl EditKind {
             Self::Accept => "Accept",
             Self::SetParameters => "Parameters",
             Self::SetViewpoints => "Viewpoints",
+            Self::SetScanner => "Scanner places",
             Self::Recipe => "Recipe",
         }
     }
@@ -237,6 +245,7 @@ impl Edit {
             Self::Accept(_) => EditKind::Accept,
             Self::SetParameters(_) => EditKind::SetParameters,
             Self::SetViewpoints(_) => EditKind::SetViewpoints,
+            Self::SetScanner(_) => EditKind::SetScanner,
         }
     }
 }
@@ -287,6 +296,12 @@ pub enum EditError {
     /// A viewpoint is not a place.
     #[error("viewpoint {} is nowhere: its coordinates must be finite numbers", index + 1)]
     NoPlace {
+        /// Which one, from 0.
+        index: usize,
+    },
+    /// A place of the scanner is not one.
+    #[error("scanner place {} is nowhere: its coordinates must be finite numbers", index + 1)]
+    NoScannerPlace {
         /// Which one, from 0.
         index: usize,
     },

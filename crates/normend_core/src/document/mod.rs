@@ -48,7 +48,7 @@ pub use history::{SetSizes, Step};
 use marks::Overlay;
 pub use marks::{Mark, Marks};
 pub use region_names::{RegionNames, RegionOutline};
-pub use state::{State, StateChange};
+pub use state::{ScannerChoice, State, StateChange};
 use turned_patches::TurnedPatches;
 pub use viewer::Viewer;
 
@@ -353,6 +353,7 @@ impl Document {
             check_direction(point, normal)?;
         }
         check_viewpoints(change.viewpoints.as_deref().unwrap_or_default())?;
+        change.scanner.as_ref().map_or(Ok(()), check_scanner)?;
         Ok(self.perform(kind, change, Some(n_turned)))
     }
 
@@ -603,6 +604,13 @@ fn check_viewpoints(places: &[Vec3]) -> Result<(), EditError> {
         return Err(EditError::TooManyViewpoints { n_viewpoints });
     }
     Ok(())
+}
+
+fn check_scanner(scanner: &ScannerChoice) -> Result<(), EditError> {
+    match scanner.own.iter().position(|station| !station.position.is_finite()) {
+        Some(index) => Err(EditError::NoScannerPlace { index }),
+        None => Ok(()),
+    }
 }
 
 fn check_direction(point: u32, normal: Vec3) -> Result<(), EditError> {

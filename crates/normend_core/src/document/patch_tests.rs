@@ -38,6 +38,8 @@ fn propagation(turned: [bool; 8]) -> Propagation {
         patches: Some(Arc::new(Patches::new(&world.tree, &levels))),
         evidence: None,
         found_station: None,
+        stations: Arc::default(),
+        has_track: false,
         seconds: Vec::new(),
     }
 }

@@ -8,7 +8,17 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::Marks;
+use crate::evidence::Station;
 use crate::{Mark, Parameters, PointSet, Source, Sources};
+
+/// What the user decides about the places of the scanner.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ScannerChoice {
+    /// The places that came with the scan count for nothing.
+    pub without_file: bool,
+    /// The user's own places.
+    pub own: Arc<[Station]>,
+}
 
 /// All that a user decides about a cloud. Everything else is derived from it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,6 +37,8 @@ pub struct State {
     pub parameters: Parameters,
     /// Viewpoints that vote for sources instead of the usual ones, in the cloud's own space; empty for the usual ones.
     pub viewpoints: Arc<[Vec3]>,
+    /// The places of the scanner.
+    pub scanner: ScannerChoice,
 }
 
 /// A change of the state: what is there after it.
@@ -48,6 +60,8 @@ pub struct StateChange {
     pub parameters: Option<Parameters>,
     /// The viewpoints, where they change.
     pub viewpoints: Option<Arc<[Vec3]>>,
+    /// The places of the scanner, where they change.
+    pub scanner: Option<ScannerChoice>,
 }
 
 impl StateChange {
@@ -71,6 +85,7 @@ impl StateChange {
             accepted: &before.accepted ^ &after.accepted,
             parameters: (before.parameters != after.parameters).then_some(after.parameters),
             viewpoints: (before.viewpoints != after.viewpoints).then(|| Arc::clone(&after.viewpoints)),
+            scanner: (before.scanner != after.scanner).then(|| after.scanner.clone()),
         }
     }
 
@@ -79,9 +94,10 @@ impl StateChange {
         !self.is_of_signs() && self.selected.is_empty() && self.hidden.is_empty() && self.accepted.is_empty()
     }
 
-    /// Whether it can change the sign of any point: sources, marks, parameters or viewpoints.
+    /// Whether it can change the sign of any point: sources, marks, parameters, viewpoints or places of the scanner.
     pub fn is_of_signs(&self) -> bool {
-        !self.sources.is_empty() || !self.marks.is_empty() || self.parameters.is_some() || self.viewpoints.is_some()
+        let is_of_orienting = self.parameters.is_some() || self.viewpoints.is_some() || self.scanner.is_some();
+        !self.sources.is_empty() || !self.marks.is_empty() || is_of_orienting
     }
 
     /// How many points it names, the largest of its parts.
@@ -106,6 +122,7 @@ impl StateChange {
             + size_of_val(&*self.marks)
             + sets.into_iter().sum::<usize>()
             + self.viewpoints.as_ref().map_or(0, |places| size_of_val(&**places))
+            + self.scanner.as_ref().map_or(0, |scanner| size_of_val(&*scanner.own))
     }
 }
 
@@ -138,6 +155,7 @@ impl State {
             accepted: change.accepted.clone(),
             parameters: (change.parameters).map(|parameters| std::mem::replace(&mut self.parameters, parameters)),
             viewpoints: (change.viewpoints.clone()).map(|places| std::mem::replace(&mut self.viewpoints, places)),
+            scanner: (change.scanner.clone()).map(|scanner| std::mem::replace(&mut self.scanner, scanner)),
         }
     }
 }

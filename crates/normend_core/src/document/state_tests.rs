@@ -55,6 +55,8 @@ fn row(cuts: &[u32], has_patches: bool) -> Document {
         patches: has_patches.then(|| Arc::new(Patches::new(tree, &levels))),
         evidence: None,
         found_station: None,
+        stations: Arc::default(),
+        has_track: false,
         seconds: Vec::new(),
     });
     document

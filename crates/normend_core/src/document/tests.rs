@@ -58,6 +58,8 @@ fn propagation_of(world: &World, normals: &[Vec3]) -> Propagation {
         viewpoints: Arc::default(),
         evidence: None,
         found_station: None,
+        stations: Arc::default(),
+        has_track: false,
         seconds: Vec::new(),
     }
 }

@@ -105,6 +105,14 @@ impl Hand {
                 k_graph: 4 + self.below(9),
                 ..document.parameters()
             }),
+            EditKind::SetScanner => Edit::SetScanner(crate::document::ScannerChoice {
+                without_file: self.0.below(2) == 0,
+                own: [crate::evidence::Station {
+                    points: 0..7,
+                    position: self.0.direction(),
+                }]
+                .into(),
+            }),
             EditKind::SetViewpoints => {
                 let n_places = self.below(4);
                 Edit::SetViewpoints((0..n_places).map(|_| self.0.direction().as_vec3()).collect())

@@ -43,6 +43,8 @@ fn propagation(world: &World, voted: &Signs) -> Propagation {
         patches: None,
         evidence: None,
         found_station: None,
+        stations: Arc::default(),
+        has_track: false,
         seconds: Vec::new(),
     }
 }

@@ -17,9 +17,11 @@ mod outside_views;
 mod scanner;
 mod scene;
 mod station_search;
+mod tallies;
+mod track;
 
 use fixedbitset::FixedBitSet;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 pub use crossings::{crossing_axes, crossings};
@@ -29,6 +31,8 @@ pub use inside_views::inside_views;
 pub use outside_views::{N_VIEWS, outside_views};
 pub use scanner::{Station, scanner};
 pub use station_search::{FoundStation, find_station};
+pub use tallies::{Tally, tallies};
+pub use track::Track;
 
 use crate::copies::Members;
 
@@ -43,9 +47,30 @@ pub struct Known<'a> {
     pub given: Option<&'a [Vec3]>,
     /// Where the scanner stood.
     pub stations: &'a [Station],
+    /// Where the scanner was while it moved.
+    pub track: Option<&'a Track>,
     /// Viewpoints that vote for sources instead of the usual ones, in the cloud's own space; empty for the usual ones.
     pub viewpoints: &'a [Vec3],
 }
+
+impl Known<'_> {
+    /// Whether a place of the scanner is known.
+    pub fn has_scanner(&self) -> bool {
+        !self.stations.is_empty() || self.track.is_some()
+    }
+
+    /// Places to look at the cloud from, in the file's coordinates: all of a scanner that stood, and [`TRACK_PLACES`] along the way of one
+    /// that moved.
+    pub fn places(&self) -> Vec<DVec3> {
+        let corners = self.track.map_or(&[][..], Track::corners);
+        let step = corners.len().div_ceil(TRACK_PLACES).max(1);
+        let stood = self.stations.iter().map(|station| station.position);
+        stood.chain(corners.iter().copied().step_by(step)).collect()
+    }
+}
+
+/// Most places along a way that a cloud is looked at from: as many as [`inside_places`] finds in a building of many rooms.
+const TRACK_PLACES: usize = 64;
 
 impl<'a> From<Option<&'a [Vec3]>> for Known<'a> {
     fn from(given: Option<&'a [Vec3]>) -> Self {
@@ -159,6 +184,12 @@ impl Evidence {
     pub fn share_known(&self) -> f64 {
         let n_known = self.votes.par_iter().filter(|vote| vote.weight >= UNIT / 3).count();
         n_known as f64 / self.votes.len().max(1) as f64
+    }
+
+    /// The share of points that have any vote, in 0..=1.
+    pub fn share_cast(&self) -> f64 {
+        let n_cast = self.votes.par_iter().filter(|vote| vote.weight > 0).count();
+        n_cast as f64 / self.votes.len().max(1) as f64
     }
 
     /// Where the votes come from, ascending.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Evidence, Origin, UNIT, Vote};
+use super::{Evidence, Known, Origin, UNIT, Vote};
 use crate::PointCloud;
 
 /// A place that a scanner measured points from.
@@ -28,11 +28,12 @@ const LOOKS: f64 = 4.0;
 /// Votes for the side of each point that its scanner stood on.
 ///
 /// `normals` are `n` unit normals of any sign; votes are for these. A vote fades from 60° between normal and ray to zero at
-/// 90°. Points of no station get no vote, points of several get one from each. Ranges that reach beyond the cloud are cut.
+/// 90°. Points of no station get no vote, points of several get one from each, and one from the track. Ranges that reach beyond
+/// the cloud are cut.
 /// O(n + points of all stations), in parallel.
-pub fn scanner(cloud: &PointCloud, normals: &[Vec3], stations: &[Station]) -> Evidence {
+pub fn scanner(cloud: &PointCloud, normals: &[Vec3], known: &Known<'_>) -> Evidence {
     let mut votes = vec![Vote::default(); cloud.n_points()];
-    for station in stations {
+    for station in known.stations {
         // Both may be far from zero: the difference is taken before f32 rounds.
         let position = station.position - cloud.origin();
         let end = (station.points.end as usize).min(votes.len());
@@ -40,18 +41,54 @@ pub fn scanner(cloud: &PointCloud, normals: &[Vec3], stations: &[Station]) -> Ev
         let measured = &cloud.positions()[points.clone()];
         (&mut votes[points.clone()], measured, &normals[points])
             .into_par_iter()
-            .for_each(|(vote, point, normal)| {
-                let ray = (position - point.as_dvec3()).normalize_or_zero();
-                let share = (normal.as_dvec3().dot(ray) / SURE_COSINE).clamp(-1.0, 1.0);
-                vote.cast((share * LOOKS * f64::from(UNIT)).round() as i32);
-            });
+            .for_each(|(vote, point, normal)| vote.cast(look(position, *point, *normal)));
+    }
+    if let Some(track) = known.track {
+        let points = (&mut votes, cloud.positions(), normals).into_par_iter().enumerate();
+        points.for_each(|(point, (vote, position, normal))| {
+            if let Some(place) = track.place(point) {
+                vote.cast(look(place - cloud.origin(), *position, *normal));
+            }
+        });
     }
     Evidence::new(Origin::Scanner, votes)
+}
+
+/// What a scanner at `place` says of the side of a normal, in units of 1/[`UNIT`]; both places in the cloud's own space.
+pub(super) fn look(place: DVec3, point: Vec3, normal: Vec3) -> i32 {
+    let ray = (place - point.as_dvec3()).normalize_or_zero();
+    let share = (normal.as_dvec3().dot(ray) / SURE_COSINE).clamp(-1.0, 1.0);
+    (share * LOOKS * f64::from(UNIT)).round() as i32
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evidence::Track;
+
+    fn from(stations: &[Station]) -> Known<'_> {
+        Known {
+            stations,
+            ..Known::default()
+        }
+    }
+
+    #[test]
+    fn a_moving_scanner_votes_from_where_it_was() {
+        let cloud = PointCloud::new(DVec3::ZERO, vec![Vec3::ZERO, Vec3::X, Vec3::Y]).unwrap();
+        let corners = vec![DVec3::new(0.0, 0.0, 5.0), DVec3::new(0.0, 0.0, -5.0)];
+        let along = [Some(0.25), Some(1.0), None];
+        let track = Track::new(corners, 3, |point| along[point]);
+        let known = Known {
+            track: Some(&track),
+            ..Known::default()
+        };
+        let evidence = scanner(&cloud, &[Vec3::Z; 3], &known);
+        let signed: Vec<i32> = evidence.votes().iter().map(|vote| vote.signed / UNIT).collect();
+        assert_eq!(signed, [4, -4, 0]);
+        assert!(known.has_scanner());
+        assert_eq!(known.places(), track.corners());
+    }
 
     /// A point at the file's `point` with the normal +z, and a scanner at `station`: the signed vote in looks.
     fn check(point: DVec3, station: DVec3, expect: f32) {
@@ -61,7 +98,7 @@ mod tests {
             points: 0..1,
             position: station,
         };
-        let evidence = scanner(&cloud, &[Vec3::Z; 2], &[station]);
+        let evidence = scanner(&cloud, &[Vec3::Z; 2], &from(&[station]));
         let looks = evidence.votes()[0].signed as f32 / UNIT as f32;
         assert!((looks - expect).abs() < 1e-3, "{looks}");
         assert_eq!(evidence.votes()[0].weight, evidence.votes()[0].signed.abs());
@@ -106,7 +143,7 @@ mod tests {
             station(80..90, 9.0),
             station(0..1, -9.0),
         ];
-        let evidence = scanner(&cloud, &[Vec3::Z; 3], &stations);
+        let evidence = scanner(&cloud, &[Vec3::Z; 3], &from(&stations));
         let signed: Vec<i32> = evidence.votes().iter().map(|vote| vote.signed / UNIT).collect();
         assert_eq!(signed, [0, 8, 4]);
         assert_eq!(evidence.votes()[0].weight, 8 * UNIT);

@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD_NO_PAD as BASE64;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use normend_core::document::ScannerChoice;
+use normend_core::evidence::Station;
 use normend_core::sources::{Origin, SourcePatch};
 use normend_core::{
     EdgeRule, EditKind, Estimator, Mark, Method, Parameters, PointSet, SideRule, Source, SourceRule, Start, StateChange,
@@ -44,6 +46,40 @@ struct ScanLine {
     points: u64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     columns: Option<Vec<String>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    files: Vec<ScanLine>,
+}
+
+impl From<&ScanIdentity> for ScanLine {
+    fn from(scan: &ScanIdentity) -> Self {
+        Self {
+            name: scan.name.clone(),
+            path: scan.path.clone(),
+            bytes: scan.n_bytes,
+            blake3: blake3::Hash::from_bytes(scan.hash).to_hex().to_string(),
+            points: scan.n_points,
+            columns: scan.columns.clone(),
+            files: scan.files.iter().map(Self::from).collect(),
+        }
+    }
+}
+
+impl TryFrom<ScanLine> for ScanIdentity {
+    type Error = String;
+
+    fn try_from(line: ScanLine) -> Result<Self, String> {
+        let hash = blake3::Hash::from_hex(&line.blake3);
+        let hash = hash.map_err(|error| format!("the scan's hash is none: {error}"))?;
+        Ok(Self {
+            name: line.name,
+            path: line.path,
+            n_bytes: line.bytes,
+            hash: *hash.as_bytes(),
+            n_points: line.points,
+            columns: line.columns,
+            files: line.files.into_iter().map(Self::try_from).collect::<Result<_, _>>()?,
+        })
+    }
 }
 
 impl HeadLine {
@@ -57,19 +93,11 @@ impl HeadLine {
 
 impl From<&Head> for HeadLine {
     fn from(head: &Head) -> Self {
-        let scan = &head.scan;
         Self {
             format: Self::FORMAT.into(),
             version: Self::VERSION,
             program: head.program.clone(),
-            scan: ScanLine {
-                name: scan.name.clone(),
-                path: scan.path.clone(),
-                bytes: scan.n_bytes,
-                blake3: blake3::Hash::from_bytes(scan.hash).to_hex().to_string(),
-                points: scan.n_points,
-                columns: scan.columns.clone(),
-            },
+            scan: ScanLine::from(&head.scan),
             parameters: head.parameters.into(),
         }
     }
@@ -79,18 +107,9 @@ impl TryFrom<HeadLine> for Head {
     type Error = String;
 
     fn try_from(line: HeadLine) -> Result<Self, String> {
-        let hash = blake3::Hash::from_hex(&line.scan.blake3);
-        let hash = hash.map_err(|error| format!("the scan's hash is none: {error}"))?;
         Ok(Self {
             program: line.program,
-            scan: ScanIdentity {
-                name: line.scan.name,
-                path: line.scan.path,
-                n_bytes: line.scan.bytes,
-                hash: *hash.as_bytes(),
-                n_points: line.scan.points,
-                columns: line.scan.columns,
-            },
+            scan: line.scan.try_into()?,
             parameters: line.parameters.try_into()?,
         })
     }
@@ -190,6 +209,44 @@ pub(super) struct EventLine {
     parameters: Option<NamedParameters>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     viewpoints: Option<Vec<[f32; 3]>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    scanner: Option<ScannerLine>,
+}
+
+/// What counts of the scanner's places.
+#[derive(Serialize, Deserialize)]
+struct ScannerLine {
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    without_file: bool,
+    /// First point, point after the last, and the place in the file's coordinates.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    own: Vec<(u32, u32, [f64; 3])>,
+}
+
+impl From<&ScannerChoice> for ScannerLine {
+    fn from(choice: &ScannerChoice) -> Self {
+        let own = choice.own.iter().map(|station| {
+            let points = &station.points;
+            (points.start, points.end, station.position.to_array())
+        });
+        Self {
+            without_file: choice.without_file,
+            own: own.collect(),
+        }
+    }
+}
+
+impl From<ScannerLine> for ScannerChoice {
+    fn from(line: ScannerLine) -> Self {
+        let own = line.own.into_iter().map(|(start, end, position)| Station {
+            points: start..end,
+            position: DVec3::from(position),
+        });
+        Self {
+            without_file: line.without_file,
+            own: own.collect(),
+        }
+    }
 }
 
 fn is_zero(number: &u64) -> bool {
@@ -244,6 +301,7 @@ impl EventLine {
             accepted: None,
             parameters: None,
             viewpoints: None,
+            scanner: None,
         }
     }
 
@@ -259,6 +317,7 @@ impl EventLine {
             accepted: set_text(&change.accepted)?,
             parameters: change.parameters.map(NamedParameters::from),
             viewpoints: (change.viewpoints.as_ref()).map(|places| places.iter().map(Vec3::to_array).collect()),
+            scanner: change.scanner.as_ref().map(ScannerLine::from),
             ..Self::named(Self::STEP)
         })
     }
@@ -292,6 +351,7 @@ impl TryFrom<EventLine> for Event {
                 accepted: set_of_text(line.accepted)?,
                 parameters: line.parameters.map(Parameters::try_from).transpose()?,
                 viewpoints: viewpoints.map(Iterator::collect::<Arc<[Vec3]>>),
+                scanner: line.scanner.map(ScannerChoice::from),
             },
         }))
     }

@@ -1,6 +1,8 @@
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use normend_core::document::ScannerChoice;
+use normend_core::evidence::Station;
 use normend_core::sources::{Origin, SourcePatch};
 use normend_core::{Mark, PointSet, Preset, SideRule, Source};
 use proptest::prelude::*;
@@ -54,6 +56,17 @@ fn any_parameters() -> impl Strategy<Value = Parameters> {
     })
 }
 
+fn any_scanner() -> impl Strategy<Value = ScannerChoice> {
+    let station = (any::<u32>(), any::<u32>(), -1e7..1e7_f64, any_vec3()).prop_map(|(start, end, x, place)| Station {
+        points: start..end,
+        position: DVec3::new(x, f64::from(place.y), f64::from(place.z)),
+    });
+    (any::<bool>(), prop::collection::vec(station, 0..4)).prop_map(|(without_file, own)| ScannerChoice {
+        without_file,
+        own: own.into(),
+    })
+}
+
 fn any_step() -> impl Strategy<Value = RecordedStep> {
     let change = (
         prop::collection::vec(any_source(), 0..4),
@@ -61,9 +74,10 @@ fn any_step() -> impl Strategy<Value = RecordedStep> {
         [any_points(), any_points(), any_points()],
         prop::option::of(any_parameters()),
         prop::option::of(prop::collection::vec(any_vec3(), 0..4)),
+        prop::option::of(any_scanner()),
     );
     let change = change.prop_map(
-        |(sources, marks, [selected, hidden, accepted], parameters, viewpoints)| StateChange {
+        |(sources, marks, [selected, hidden, accepted], parameters, viewpoints, scanner)| StateChange {
             sources,
             marks,
             selected,
@@ -71,6 +85,7 @@ fn any_step() -> impl Strategy<Value = RecordedStep> {
             accepted,
             parameters,
             viewpoints: viewpoints.map(Arc::from),
+            scanner,
         },
     );
     (select(EditKind::ALL.to_vec()), change, any::<u64>()).prop_map(|(kind, change, n_turned)| RecordedStep {
@@ -105,6 +120,11 @@ fn any_recipe(n_events: usize) -> impl Strategy<Value = Recipe> {
         hash,
         n_points,
         columns: (n_points % 2 == 0).then(|| vec!["x".into(), "-".into(), "y".into(), "z".into()]),
+        files: Vec::new(),
+    });
+    let scan = (scan, 0..3_usize).prop_map(|(scan, n_files)| ScanIdentity {
+        files: vec![scan.clone(); n_files],
+        ..scan
     });
     let events = prop::collection::vec(any_event(), 0..=n_events);
     (scan, any_parameters(), events).prop_map(|(scan, parameters, events)| Recipe {
@@ -249,6 +269,7 @@ fn a_head() -> Head {
         hash: [7; 32],
         n_points: 4_000_000,
         columns: None,
+        files: Vec::new(),
     };
     Head::new(scan, Parameters::default())
 }
