@@ -118,7 +118,7 @@ impl Drop for Bar {
 pub fn in_words(error: &anyhow::Error) -> String {
     let mut words: Vec<String> = Vec::new();
     for cause in error.chain() {
-        words.push(match cause.downcast_ref::<std::io::Error>() {
+        words.push(match cause.downcast_ref::<io::Error>() {
             Some(error) => normend_io::io_words(error),
             None => cause.to_string(),
         });

@@ -15,7 +15,7 @@ use super::batch::{Job, Plan, Typed};
 use super::convert::refuse_or_say_losses;
 use super::{Outcome, check_may_write, prepare, say_other_names, wrong_use};
 use crate::arguments::OrientArguments;
-use crate::console::{Bar, counted};
+use crate::console::{self, Bar, counted};
 use crate::memory::peak_rss_bytes;
 
 /// What is reported of an input that was oriented.
@@ -74,6 +74,11 @@ pub fn run(arguments: OrientArguments) -> anyhow::Result<Outcome> {
     let plan = Plan::new(typed)?;
     prepare(&arguments.common)?;
     let parameters = parameters(&arguments);
+    if let Some(flag) = arguments.propagation.turns_to_tree()
+        && !arguments.common.quiet
+    {
+        console::say(&format!("the preset is tree, as {flag} is not for auto"));
+    }
     plan.run(typed, arguments.common.quiet, |job, bar| {
         let oriented = orient(job, parameters, &arguments, bar)?;
         bar.say(&sentence(&oriented));

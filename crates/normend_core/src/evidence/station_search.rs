@@ -296,7 +296,11 @@ fn extent_without_outliers(cloud: &PointCloud, center: DVec3) -> f64 {
     let within = *distances.select_nth_unstable_by(most, f32::total_cmp).1;
     let diagonal = f64::from(cloud.diagonal());
     // All but outliers may be in one place.
-    if within > 0.0 { diagonal.min(6.0 * f64::from(within)) } else { diagonal }
+    if within > 0.0 {
+        diagonal.min(6.0 * f64::from(within))
+    } else {
+        diagonal
+    }
 }
 
 /// A number that is as good as random but belongs to the cell of a position.
@@ -498,6 +502,18 @@ mod tests {
             let found = find(office.iter().map(|p| place(p.as_dvec3()).as_vec3()).collect()).unwrap();
             let off = found.position.distance(place(OFFICE_STATION)) / scale;
             assert!(off < 0.15, "turned by {turn}, scaled by {scale}: off by {off}");
+        }
+    }
+
+    #[test]
+    fn a_few_points_far_away_do_not_hide_the_place() {
+        let office = benchmark("room_office_1_station").positions;
+        for away in [100.0, 1e5] {
+            let outliers = [Vec3::X, Vec3::new(-0.3, 0.5, 0.2)].map(|direction| away * direction);
+            let found = find(office.iter().copied().chain(outliers).collect());
+            let found = found.unwrap_or_else(|| panic!("points {away} away hide the place"));
+            let off = found.position.distance(OFFICE_STATION);
+            assert!(off < 0.3, "points {away} away: off by {off}");
         }
     }
 
