@@ -11,7 +11,7 @@ use base64::Engine as _;
 use cap::Cap;
 use normend_core::{Parameters, PointSet, Silent};
 use normend_io::recipe::{self, End, Head, LineWriter};
-use normend_io::{Scan, read, read_bytes};
+use normend_io::{Positions, Scan, read, read_bytes};
 
 #[global_allocator]
 static MEMORY: Cap<System> = Cap::new(System, usize::MAX);
@@ -89,6 +89,81 @@ fn a_title_does_not_become_the_names_of_other_columns() {
     assert!(!is_read("x y z nz ny nx a b"));
 }
 
+/// A file named `name` of `n_points` points in one place.
+fn of_one_place(name: &str, n_points: usize) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    let positions = vec![glam::Vec3::ONE; n_points];
+    normend_io::write_points(&path, Positions::Float(&positions), None, &Silent).unwrap();
+    std::fs::read(path).unwrap()
+}
+
+#[test]
+fn packed_points_are_no_bombs() {
+    // The numbers of points in the header, of 32 and of 64 bits.
+    let promise = |n_points: u64| {
+        let mut bytes = of_one_place("scan.laz", 10);
+        bytes[107..111].copy_from_slice(&u32::try_from(n_points).unwrap_or(0).to_le_bytes());
+        bytes[247..255].copy_from_slice(&n_points.to_le_bytes());
+        bytes
+    };
+    for n_points in [4_000_000_000, 1 << 60, u64::MAX] {
+        let sentence = error_of("scan.laz", &promise(n_points));
+        assert!(sentence.starts_with("scan.laz"), "{sentence}");
+    }
+    let sentence = error_of("scan.laz", &promise(4_000_000_000));
+    assert!(sentence.contains("more than 100 times as many as these"), "{sentence}");
+    // These are packed to next to nothing, and yet as small as any.
+    let bytes = of_one_place("scan.laz", 300_000);
+    let scan = limited(bytes.len(), || read_bytes(bytes.clone(), "scan.laz", &Silent).unwrap());
+    assert_eq!(scan.cloud.n_points(), 300_000);
+}
+
+#[test]
+fn counts_of_every_format_are_compared_with_the_size() {
+    let swap = |bytes: &[u8], from: &str, to: &str| {
+        let at = bytes.windows(from.len()).position(|window| window == from.as_bytes());
+        let at = at.unwrap_or_else(|| panic!("no {from}"));
+        [&bytes[..at], to.as_bytes(), &bytes[at + from.len()..]].concat()
+    };
+    let many = "4000000000";
+    let ply = swap(
+        &of_one_place("a.ply", 10),
+        "element vertex 10",
+        &format!("element vertex {many}"),
+    );
+    let pcd = of_one_place("a.pcd", 10);
+    let pcd = swap(
+        &swap(&pcd, "WIDTH 10", &format!("WIDTH {many}")),
+        "POINTS 10",
+        &format!("POINTS {many}"),
+    );
+    let pts = swap(&of_one_place("a.pts", 10), "10\n", &format!("{many}\n"));
+    let mut las = of_one_place("a.las", 10);
+    las[107..111].copy_from_slice(&4_000_000_000_u32.to_le_bytes());
+    las[247..255].copy_from_slice(&4_000_000_000_u64.to_le_bytes());
+    let ptx =
+        format!("{many}\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n1 2 3 0.5\n").into_bytes();
+    for (name, bytes) in [
+        ("a.ply", ply),
+        ("a.pcd", pcd),
+        ("a.pts", pts),
+        ("a.las", las),
+        ("a.ptx", ptx),
+    ] {
+        let sentence = error_of(name, &bytes);
+        assert!(sentence.starts_with(name) && sentence.contains(many), "{sentence}");
+    }
+    // E57 has a checksum on each page, and its count in an XML section.
+    let mut e57 = swap(&of_one_place("a.e57", 10), "recordCount=\"10\"", "recordCount=\"99\"");
+    for page in e57.chunks_exact_mut(1024) {
+        let (content, checksum) = page.split_at_mut(1020);
+        checksum.copy_from_slice(&crc32c::crc32c(content).to_be_bytes());
+    }
+    let sentence = error_of("a.e57", &e57);
+    assert!(sentence.starts_with("a.e57, byte "), "{sentence}");
+}
+
 /// What `bytes` become when they are written as a file named `target`, with all normals up.
 fn written(name: &str, bytes: &[u8], target: &str) -> String {
     let scan = read_bytes(bytes.to_vec(), name, &Silent).unwrap();
@@ -107,6 +182,15 @@ fn empty_values_add_no_columns() {
     assert_eq!(
         written("a.csv", b"x,y,,z,i\n1,2,,3,4\n1,2,7,4,4\n", "b.csv"),
         "x,y,,z,nx,ny,nz,i\n1,2,,3,0,0,1,4\n1,2,7,4,0,0,1,4\n"
+    );
+}
+
+#[test]
+fn faces_name_no_normals_that_are_written_later() {
+    assert_eq!(
+        error_of("a.obj", b"v 0 0 0\nf 1//1 2//2 3//3\n"),
+        "a.obj, line 2: \"1//1\" refers to a point or normal that is not there (1 points, 0 normals): correct it, or remove \
+         the part after the last slash"
     );
 }
 

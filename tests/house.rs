@@ -207,6 +207,72 @@ fn no_lint_against_panics_is_excused() {
     assert!(found.is_empty(), "{found:#?}");
 }
 
+/// Files that may lift the lint against unsafe code, and why: none so far. What is in the list runs under Miri (`scripts/miri`).
+const MAY_BE_UNSAFE: [(&str, &str); 0] = [];
+
+/// Code of `files` that could do what the compiler does not check, without comments.
+fn unsafe_lines(files: &[PathBuf]) -> Vec<String> {
+    let words = ["unsafe", "no_mangle", "link_section", "extern \"C\""];
+    let mut found = lines_with(files, &words);
+    // Lints that forbid it.
+    found.retain(|line| !line.contains("forbid(unsafe_code)") && !line.contains("deny(unsafe_code)"));
+    found
+}
+
+#[test]
+fn unsafe_code_stands_only_where_the_list_says() {
+    let mut files = Vec::new();
+    for folder in ["crates", "tests", "fuzz/src", "fuzz/fuzz_targets"] {
+        files.extend(files_below(folder, ".rs"));
+    }
+    assert!(files.len() > 100, "the sources are not where they were");
+    let this_file = root().join("tests/house.rs");
+    let is_listed = |path: &PathBuf| MAY_BE_UNSAFE.iter().any(|(listed, _)| path.ends_with(listed));
+    files.retain(|path| *path != this_file && !is_listed(path));
+    let found = unsafe_lines(&files);
+    assert!(found.is_empty(), "{found:#?}");
+    for (path, reason) in MAY_BE_UNSAFE {
+        let still_needs_it = !unsafe_lines(&[root().join(path)]).is_empty();
+        assert!(
+            still_needs_it && !reason.is_empty(),
+            "{path} is not unsafe any more: take it off the list"
+        );
+    }
+    // The search finds what it looks for.
+    assert!(!unsafe_lines(&[this_file]).is_empty());
+    let manifest = fs::read_to_string(root().join("Cargo.toml")).unwrap();
+    assert!(manifest.contains("\nunsafe_code = \"deny\"\n"));
+}
+
+#[test]
+fn every_target_of_fuzzing_has_seeds_and_words() {
+    let manifest = fs::read_to_string(root().join("fuzz/Cargo.toml")).unwrap();
+    let page = fs::read_to_string(root().join("docs/fuzzing.md")).unwrap();
+    let targets = files_below("fuzz/fuzz_targets", ".rs");
+    assert!(targets.len() >= 12, "the targets are not where they were");
+    for target in targets {
+        let name = target.file_stem().unwrap().to_string_lossy().into_owned();
+        assert!(manifest.contains(&format!("name = \"{name}\"")), "{name} is not built");
+        assert!(
+            page.contains(&format!("| `{name}` |")),
+            "docs/fuzzing.md says nothing of {name}"
+        );
+        assert!(
+            !files_below(&format!("fuzz/seeds/{name}"), "").is_empty(),
+            "{name} has no seeds"
+        );
+        let words = fs::read_to_string(root().join(format!("fuzz/dictionaries/{name}.dict"))).unwrap();
+        assert!(
+            words.lines().filter(|line| line.starts_with('"')).count() > 5,
+            "{name} has no words"
+        );
+    }
+    let n_bytes: u64 = (files_below("fuzz/seeds", "").iter())
+        .map(|seed| fs::metadata(seed).unwrap().len())
+        .sum();
+    assert!(n_bytes < 300_000, "the seeds have {n_bytes} bytes: keep them small");
+}
+
 #[test]
 fn every_crate_takes_the_lints_of_the_workspace() {
     for manifest in files_below("crates", "Cargo.toml") {

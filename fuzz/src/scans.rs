@@ -11,7 +11,7 @@ use crate::limits::{folder, limited};
 /// Unit vectors that every type of number holds.
 const NORMALS: [Vec3; 6] = [Vec3::X, Vec3::NEG_Z, Vec3::Y, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Y];
 /// One extension for each way of writing.
-const EXTENSIONS: [&str; 8] = ["ply", "xyz", "csv", "pts", "las", "laz", "pcd", "e57"];
+const EXTENSIONS: [&str; 9] = ["ply", "xyz", "csv", "pts", "las", "laz", "pcd", "e57", "obj"];
 /// Longest sentence that says what is wrong with a file.
 const MOST_WORDS: usize = 600;
 

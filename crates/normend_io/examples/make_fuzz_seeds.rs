@@ -107,7 +107,7 @@ fn packed(root: &Path) -> Result<(), Box<dyn Error>> {
     let grids = grid(0.0) + &grid(10.5);
     put(&root.join("ptx"), "grids.ptx", &grids)?;
     let grids = read_bytes(grids.into(), "grids.ptx", &Silent)?;
-    for extension in ["las", "laz", "pcd", "ptx", "e57"] {
+    for extension in ["las", "laz", "pcd", "ptx", "e57", "obj"] {
         let folder = root.join(extension);
         written(&folder, &format!("plain.{extension}"), false)?;
         for (name, scan) in [("rich", &rich), ("grids", &grids)] {
@@ -116,6 +116,12 @@ fn packed(root: &Path) -> Result<(), Box<dyn Error>> {
             scan.write(&normals, &path, &WriteOptions::default(), &Silent)?;
         }
     }
+    put(
+        &root.join("obj"),
+        "faces.obj",
+        "# a mesh\nmtllib a.mtl\no part\nv 0 0 0\nv 1 0 0 0.5 0.25 1\nv 0 1 0\nvn 0 0 1\nvn 0 1 0\nvt 0 0\nusemtl a\ns off\n\
+         f 1/1/1 2/1/2 3/1/1\nf -3//-2 -2 -1\np 1\nl 1 \\\n2\n",
+    )?;
     let pcd = |data: &str, points: &[u8]| {
         let head = format!(
             "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\n\

@@ -131,6 +131,10 @@ pub fn find(folder: &Path, scan: &ScanIdentity, patience: Duration) -> Findings 
         if path.extension().is_none_or(|extension| extension != EXTENSION) {
             continue;
         }
+        // A pipe would be waited for, a device read without end, a link written through to whatever it names.
+        if !fs::symlink_metadata(&path).is_ok_and(|metadata| metadata.is_file()) {
+            continue;
+        }
         let head = head_of(&path);
         let may_be_same = name.starts_with(hash) || head.as_ref().is_some_and(|head| head.is_same_content(scan));
         let is_of_path = scan.path.is_some() && head.is_some_and(|head| head.path == scan.path);

@@ -317,3 +317,25 @@ fn a_journal_follows_its_scan_to_another_content() {
     select(&mut journal, 3..4);
     assert_eq!(selected(&path), [0, 2, 3]);
 }
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_no_journal() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = Journal::new(folder.path(), head());
+    select(&mut journal, 0..3);
+    let path = journal.path().unwrap();
+    drop(journal);
+    let name = |number: u32| path.with_file_name(format!("0101010101010101-a_scan.ply-{number}.journal"));
+    // Nobody ever writes into this pipe: reading it would wait forever. The device has no end.
+    assert!(std::process::Command::new("mkfifo").arg(name(2)).status().unwrap().success());
+    std::os::unix::fs::symlink("/dev/zero", name(3)).unwrap();
+    let elsewhere = folder.path().join("elsewhere");
+    fs::copy(&path, &elsewhere).unwrap();
+    std::os::unix::fs::symlink(&elsewhere, name(4)).unwrap();
+    fs::create_dir(name(5)).unwrap();
+    let findings = find_in(folder.path());
+    assert_eq!(findings.problems, Vec::<String>::new());
+    let found: Vec<&Path> = findings.offers.iter().map(|offer| offer.path()).collect();
+    assert_eq!(found, [path.as_path()]);
+}

@@ -17,6 +17,8 @@ use super::{Settings, VERSION};
 use crate::folders;
 
 const FILE_NAME: &str = "settings.toml";
+/// More are no settings: a hundred times what all values take.
+const MOST_BYTES: u64 = 1 << 20;
 const BROKEN_NAME: &str = "settings.toml.broken";
 /// Held while the file is read and written again.
 const LOCK_NAME: &str = "settings.lock";
@@ -102,6 +104,17 @@ enum Unread {
 
 /// What the file says, in the form of this version.
 fn read_table(file: &Path) -> Result<Table, Unread> {
+    let metadata = fs::metadata(file).map_err(|error| match error.kind() {
+        io::ErrorKind::NotFound => Unread::Missing,
+        _ => Unread::Unreadable(error),
+    })?;
+    // A pipe would be waited for, a device read without end.
+    if !metadata.is_file() {
+        return Err(Unread::NotUnderstood("it is no file".to_owned()));
+    }
+    if metadata.len() > MOST_BYTES {
+        return Err(Unread::NotUnderstood("it is larger than settings are".to_owned()));
+    }
     let text = fs::read_to_string(file).map_err(|error| match error.kind() {
         io::ErrorKind::NotFound => Unread::Missing,
         io::ErrorKind::InvalidData => Unread::NotUnderstood("it is no text".to_owned()),
@@ -312,6 +325,42 @@ mod tests {
             assert!(problem.contains(BROKEN_NAME), "{problem}");
             assert_eq!(fs::read_to_string(folder.path().join(BROKEN_NAME)).unwrap(), content);
             assert!(!folder.path().join(FILE_NAME).exists());
+        }
+    }
+
+    #[test]
+    fn a_file_that_is_too_large_is_set_aside() {
+        let folder = written(&format!("# {}", "a".repeat(1 << 20)));
+        let (store, problem) = SettingsStore::load_from(folder.path());
+        assert_eq!(store.settings, Settings::default());
+        assert!(problem.unwrap().contains("larger than settings are"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_no_file_is_set_aside() {
+        for target in ["pipe", "/dev/zero"] {
+            let folder = tempfile::tempdir().unwrap();
+            let file = folder.path().join(FILE_NAME);
+            if target == "pipe" {
+                assert!(
+                    std::process::Command::new("mkfifo")
+                        .arg(&file)
+                        .status()
+                        .unwrap()
+                        .success()
+                );
+            } else {
+                std::os::unix::fs::symlink(target, &file).unwrap();
+            }
+            let (mut store, problem) = SettingsStore::load_from(folder.path());
+            assert!(problem.unwrap().contains("it is no file"));
+            store.settings.theme = ThemeChoice::Dark;
+            store.save_if_changed().unwrap();
+            assert_eq!(
+                SettingsStore::load_from(folder.path()).0.settings.theme,
+                ThemeChoice::Dark
+            );
         }
     }
 

@@ -146,7 +146,8 @@ impl ObjLayout {
         let (n_points, n_normals) = (self.table.n_rows, self.normals.len());
         let mut normal_of_point = Vec::new();
         let mut is_one_to_one = n_points == n_normals;
-        if n_normals > 0 && self.others[0].0 > 0 {
+        // Also without normals: those that are written later must not be what a face happens to name.
+        if self.others[0].0 > 0 {
             let mut next_report = 0;
             let (mut n_points_before, mut n_normals_before) = (0, 0);
             for line in lines(bytes) {
