@@ -201,7 +201,7 @@ fn points_that_are_not_finite_stay_in_the_file() {
                  nan nan nan\n1 2 3\n1 -inf 3\n4 5 6\n";
     let scan = scan("scan.ply", input);
     assert_eq!(points(&scan), [DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0)]);
-    assert_eq!(scan.rows.as_ref().unwrap()[..], [1, 3]);
+    assert_eq!(scan.rows().unwrap()[..], [1, 3]);
     assert_eq!(scan.n_left_out, 2);
     let out = written(&scan, &[Vec3::X, Vec3::Y], "out.ply");
     let out = String::from_utf8(out).unwrap();
@@ -522,7 +522,7 @@ fn text_from_another_format_has_what_its_extension_asks_for() {
             assert_eq!(row.split(separator).count(), 6, "{text}");
         }
         let again = read_bytes(text.into_bytes(), name, &Silent).unwrap();
-        assert_eq!((again.format, again.n_left_out), (FileFormat::Xyz, 1));
+        assert_eq!((again.format(), again.n_left_out), (FileFormat::Xyz, 1));
         assert_eq!(points(&again), points(&scan), "{name}");
         assert_eq!(again.given_normals.unwrap()[..], finite, "{name}");
 
@@ -554,10 +554,10 @@ fn fresh_clouds() {
     let path = folder.path().join("new.ply");
     write_points(&path, Positions::Float(&positions), Some(&normals), &Silent).unwrap();
     let again = read(&path, &Silent).unwrap();
-    assert_eq!(again.format, FileFormat::Ply);
+    assert_eq!(again.format(), FileFormat::Ply);
     assert_eq!(again.cloud.positions(), positions);
+    assert_eq!((again.rows(), again.n_left_out), (None, 0));
     assert_eq!(again.given_normals.unwrap()[..], normals);
-    assert_eq!((again.rows, again.n_left_out), (None, 0));
 
     let doubles = positions.map(|position| position.as_dvec3() + 1e6);
     write_points(&path, Positions::Double(&doubles), None, &Silent).unwrap();

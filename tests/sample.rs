@@ -29,7 +29,7 @@ fn opened(scan: &Scan) -> Document {
 fn the_sample_is_what_the_generator_makes() {
     let part = shapes::sample_part();
     let scan = read(sample(), &Silent).unwrap();
-    assert_eq!((scan.format, scan.n_left_out), (FileFormat::Ply, 0));
+    assert_eq!((scan.format(), scan.n_left_out), (FileFormat::Ply, 0));
     assert_eq!(scan.cloud.n_points(), part.positions.len());
     // Sines may differ in the last bit from one system to the next.
     let most = 1e-6 * scan.cloud.diagonal();

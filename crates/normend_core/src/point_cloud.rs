@@ -5,6 +5,7 @@
 //! [`PointCloud::offset`] and [`PointCloud::relative`] are what neighbors, normals and edges are computed from, everywhere.
 
 use std::ops::RangeInclusive;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -114,6 +115,51 @@ impl PointCloud {
         Ok(cloud)
     }
 
+    /// One cloud of several, their points one after another in the order given. Each is dropped as soon as its points are taken over. O(n).
+    ///
+    /// # Errors
+    /// [`PointCloudError`]: too many points, an extent out of range.
+    pub fn together(clouds: Vec<Arc<Self>>) -> Result<Self, PointCloudError> {
+        let n_points = clouds.iter().map(|cloud| cloud.n_points()).sum();
+        check_count(n_points)?;
+        let corners = clouds.iter().filter(|cloud| cloud.n_points() > 0);
+        let corners = corners.map(|cloud| [cloud.min, cloud.max].map(|corner| cloud.origin + corner.as_dvec3()));
+        let corners = corners.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        let Some([min, max]) = corners else {
+            return Self::new(DVec3::ZERO, Vec::new());
+        };
+        let origin = Self::origin_for(min, max)?;
+        // The corners of what is stored, which the unit of remainders goes by, before the first remainder is taken.
+        let stored = |cloud: &Self, point: usize| (cloud.relative(point) + (cloud.origin - origin)).as_vec3();
+        let (min, max) = clouds.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |corners, cloud| {
+            let positions = (0..cloud.n_points()).into_par_iter().map(|point| stored(cloud, point));
+            positions.map(|position| (position, position)).reduce(|| corners, |a, b| (a.0.min(b.0), a.1.max(b.1)))
+        });
+        let mut joined = Self {
+            origin,
+            positions: Vec::with_capacity(n_points),
+            remainders: Vec::with_capacity(n_points),
+            min,
+            max,
+        };
+        for cloud in clouds {
+            let points = 0..cloud.n_points();
+            joined.positions.par_extend(points.clone().into_par_iter().map(|point| stored(&cloud, point)));
+            let mut remainders = std::mem::take(&mut joined.remainders);
+            let first = remainders.len();
+            remainders.par_extend(points.into_par_iter().map(|point| {
+                let lacks = cloud.relative(point) + (cloud.origin - origin) - joined.positions[first + point].as_dvec3();
+                joined.in_remainder_steps(lacks)
+            }));
+            joined.remainders = remainders;
+        }
+        let is_rounded = joined.remainders.par_iter().any(|remainder| *remainder != [0; 3]);
+        if !(is_rounded && joined.is_coarse()) {
+            joined.remainders = Vec::new();
+        }
+        Ok(joined)
+    }
+
     /// The origin that [`Self::from_f64`] chooses for points with this bounding box, in the file's coordinates.
     ///
     /// # Errors
@@ -165,7 +211,10 @@ impl PointCloud {
     /// What the position of `point` lacks of the exact place in the file's coordinates, to be given to
     /// [`Self::with_remainders`].
     pub fn remainder(&self, point: usize, exact: DVec3) -> [i8; 3] {
-        let lacks = (exact - self.origin) - self.positions[point].as_dvec3();
+        self.in_remainder_steps((exact - self.origin) - self.positions[point].as_dvec3())
+    }
+
+    fn in_remainder_steps(&self, lacks: DVec3) -> [i8; 3] {
         let steps = lacks / self.remainder_step().max(f64::MIN_POSITIVE);
         // The cast saturates: half a step of f32 up is 128.
         steps.round().to_array().map(|steps| steps as i8)
@@ -393,6 +442,36 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn clouds_together_are_as_if_read_at_once() {
+        let corner = DVec3::new(500_000.123, 4_500_000.456, 78.9);
+        for (spacing, away) in [(1e-3, 1e4), (1e-2, 1e3), (1.0, 1e5)] {
+            let near = square_and_outlier(60, spacing, corner, spacing * 70.0);
+            let far = square_and_outlier(60, spacing, corner + DVec3::X * away, spacing * 70.0);
+            let parts = [&near, &far].map(|points| Arc::new(PointCloud::from_f64(points).unwrap()));
+            let joined = PointCloud::together(parts.to_vec()).unwrap();
+            let points: Vec<DVec3> = near.iter().chain(&far).copied().collect();
+            let at_once = PointCloud::from_f64(&points).unwrap();
+            assert_eq!(joined.origin(), at_once.origin());
+            assert_eq!(joined.has_remainders(), at_once.has_remainders(), "{spacing} {away}");
+            assert_eq!(joined.n_points(), points.len());
+            let (min, max) = joined.bounding_box();
+            for (id, &point) in points.iter().enumerate() {
+                let error = (joined.origin() + joined.relative(id) - point).abs().max_element();
+                // Half a step of the parts, which have 24 bits of less than a hundred spacings, and half a step of the whole.
+                let bits = if joined.has_remainders() { 32 } else { 24 };
+                let most = 100.0 * spacing * 2.0_f64.powi(-24) + (away + 100.0) * 2.0_f64.powi(-bits) + 2e-9;
+                assert!(error <= most, "{error} of {spacing} of {away}");
+                let position = joined.positions()[id];
+                assert!(position.cmpge(min).all() && position.cmple(max).all());
+            }
+        }
+        let one = Arc::new(PointCloud::from_f64(&[DVec3::ONE, corner]).unwrap());
+        let same = PointCloud::together(vec![Arc::clone(&one)]).unwrap();
+        assert_eq!((same.origin(), same.positions()), (one.origin(), one.positions()));
+        assert_eq!(PointCloud::together(Vec::new()).unwrap().n_points(), 0);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use normend_core::Progress;
 use rayon::prelude::*;
 
 use crate::error::{Broken, ReadError, Stop, quoted};
-use crate::scan::Scan;
+use crate::scan::Layer;
 use crate::table::{COORDINATES, Layout, N_VALUES, PART_ROWS};
 use crate::value::Scalar;
 
@@ -89,7 +89,7 @@ pub(crate) fn color_byte(value: f64, white: f64) -> u8 {
     (value / white * 255.0).round().clamp(0.0, 255.0) as u8
 }
 
-impl Scan {
+impl Layer {
     /// Names of all columns of numbers, coordinates and normals among them, in the file's order: the scalar properties of a
     /// PLY's vertices, or the columns of a text, which without names are called "Column 4". Nothing but the header, or the
     /// first row, is looked at.
@@ -225,8 +225,7 @@ mod tests {
     use normend_core::Silent;
     use proptest::prelude::*;
 
-    use super::*;
-    use crate::read_bytes;
+    use crate::{Scan, read_bytes};
 
     fn scan(content: &[u8], name: &str) -> Scan {
         read_bytes(content.to_vec(), name, &Silent).unwrap()

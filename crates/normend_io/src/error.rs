@@ -76,6 +76,12 @@ pub enum WriteError {
         /// The target.
         path: PathBuf,
     },
+    /// The scan is of several files, each of which is written by itself.
+    #[error("the scan is of {n_files} files: write each of them to a file of its own")]
+    SeveralFiles {
+        /// Files of the scan.
+        n_files: usize,
+    },
     /// Not one normal for each point.
     #[error("{n_normals} normals were given for {n_points} points: give one for each")]
     Count {

@@ -9,14 +9,14 @@ use rayon::prelude::*;
 
 use crate::columns::color_byte;
 use crate::error::ReadError;
-use crate::scan::Scan;
+use crate::scan::Layer;
 
 /// What splats have that says so, after the three names of the mean color.
 const NAMES: [&str; 6] = ["f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "rot_0"];
 /// The spherical harmonic of degree 0, 1 / (2 √π), by which the mean color is measured.
 const DEGREE_0: f64 = 0.282_094_791_773_878_14;
 
-impl Scan {
+impl Layer {
     /// Whether the points are Gaussian splats. Looks at the names of columns.
     pub fn is_splats(&self) -> bool {
         self.splat_columns().is_some()

@@ -15,7 +15,7 @@ const COLUMNS: [&str; 5] = ["first", "count", "x", "y", "z"];
 
 /// Reads the places that the scanner measured `scan` from: a line for each, `first count x y z` apart by tabs, spaces or commas.
 ///
-/// `first` and `count` are rows of the scan's file, counted from 0, rows without finite coordinates among them; x y z is the
+/// `first` and `count` are rows of the scan's file (of several files, one after another), counted from 0, rows without finite coordinates among them; x y z is the
 /// place in the file's coordinates. A first line with the names of the columns, empty lines and what follows a `#` are
 /// skipped.
 ///
@@ -32,8 +32,8 @@ pub fn read_stations(path: &Path, scan: &Scan) -> Result<Vec<Station>, ReadError
 /// As [`read_stations`].
 pub fn stations_of_bytes(bytes: &[u8], name: &str, scan: &Scan) -> Result<Vec<Station>, ReadError> {
     let n_rows = scan.cloud.n_points() + scan.n_left_out;
-    let rows = scan.rows.as_ref().map(|rows| rows.as_slice());
-    parse(bytes, n_rows, rows).map_err(|broken| ReadError::Broken {
+    let rows = scan.rows();
+    parse(bytes, n_rows, rows.as_ref().map(|rows| rows.as_slice())).map_err(|broken| ReadError::Broken {
         name: name.to_owned(),
         broken,
     })

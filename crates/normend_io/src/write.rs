@@ -12,7 +12,7 @@ use crate::new_file::{Loss, NewFile, Origin};
 use crate::output::Output;
 use crate::rewrite::RowNormals;
 use crate::save;
-use crate::scan::Scan;
+use crate::scan::Layer;
 use crate::table::NewContent;
 use crate::value::Scalar;
 
@@ -27,8 +27,8 @@ pub struct WriteOptions {
     pub overwrite_changed: bool,
 }
 
-impl Scan {
-    /// Writes the file that came in with `normals` (unit, by point of the cloud) to `path`: beside it first, synced,
+impl Layer {
+    /// Writes the file that came in with `normals` (unit, by point of this file: those of the scan in [`Layer::points`]) to `path`: beside it first, synced,
     /// renamed. The format is that of `path`'s extension, or the input's ([`FileFormat::of_target`]); in another format than
     /// the input's goes all that it can hold ([`Self::losses`] names the rest), in text with what the extension asks for: names
     /// and commas in `.csv`, the number of points in `.pts`. A row that is no point keeps the normal it has, or gets `0 0 1`.
@@ -45,7 +45,7 @@ impl Scan {
         self.write_with_confidence(normals, None, path, options, progress)
     }
 
-    /// What a file at `path` would not hold of this scan: nothing in the format that came in. O(1).
+    /// What a file at `path` would not hold of this one: nothing in the format that came in. O(1).
     ///
     /// # Errors
     /// [`WriteError::Extension`].
@@ -95,7 +95,7 @@ impl Scan {
     ) -> Result<(), WriteError> {
         progress.stage("Writing");
         let format = FileFormat::of_target(path, self.path().map(PathBuf::as_path))?.unwrap_or(self.format);
-        check_normals(normals, self.cloud.n_points())?;
+        check_normals(normals, self.n_points())?;
         if let Some(confidence) = confidence {
             if confidence.len() != normals.len() {
                 return Err(WriteError::Count {
@@ -131,12 +131,18 @@ impl Scan {
         })
     }
 
-    /// Writes the scan to `path` as it is, in the format of `path`'s extension: the normals that the file has, if any, and all
-    /// else that the format can hold ([`Self::losses`] names the rest).
+    /// Writes the file to `path` as it is, in the format of `path`'s extension: the normals that it has, which are `given`, if any,
+    /// and all else that the format can hold ([`Self::losses`] names the rest).
     ///
     /// # Errors
     /// [`WriteError`]; the target is as it was then. [`WriteError::Target`] where the format is the input's already.
-    pub fn convert(&self, path: &Path, options: &WriteOptions, progress: &dyn Progress) -> Result<(), WriteError> {
+    pub(crate) fn convert(
+        &self,
+        given: Option<&[Vec3]>,
+        path: &Path,
+        options: &WriteOptions,
+        progress: &dyn Progress,
+    ) -> Result<(), WriteError> {
         progress.stage("Writing");
         let format = FileFormat::of_target(path, self.path().map(PathBuf::as_path))?.unwrap_or(self.format);
         if format == self.format {
@@ -156,7 +162,6 @@ impl Scan {
             });
         }
         let rows = self.rows.as_ref().map(|rows| rows.as_slice());
-        let given = self.given_normals.as_ref();
         let normals = given.map(|given| RowNormals::new(given, None, rows));
         let comment = format!(
             "Normend {}: converted from {}",

@@ -126,7 +126,7 @@ pub fn run(arguments: &SuspectsArguments) -> anyhow::Result<Outcome> {
 /// A suspect in the file's coordinates and rows.
 fn row(suspect: &Suspect, scan: &Scan) -> Row {
     let position = scan.cloud.relative(suspect.point as usize);
-    let row = match &scan.rows {
+    let row = match scan.rows() {
         Some(rows) => rows[suspect.point as usize],
         None => suspect.point,
     };

@@ -14,6 +14,7 @@ fn scan(hash: u8, path: &str) -> ScanIdentity {
         hash: [hash; 32],
         n_points: 100,
         columns: None,
+        files: Vec::new(),
     }
 }
 

@@ -199,7 +199,7 @@ fn values(bytes: &[u8], index: usize) -> (Vec<Record>, Vec<RawValues>) {
 #[test]
 fn all_scans_are_read_with_their_poses() {
     let scan = scan(&two_scans());
-    assert_eq!(scan.format, FileFormat::E57);
+    assert_eq!(scan.format(), FileFormat::E57);
     assert_eq!(scan.cloud.n_points(), 8);
     assert_eq!(scan.n_left_out, 1, "an invalid point is none");
     let found = positions(&scan);

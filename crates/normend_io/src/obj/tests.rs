@@ -47,7 +47,7 @@ fn normals_in_the_order_of_points_are_replaced_in_place() {
     let input = "# head\r\nmtllib a\\b\\\r\no thing\r\nvn 0.0 0.60 -.8 # first\r\nv 1 2 3 0.5 0 1\r\nvn  1 0 0\r\n\tv 4 5 6 0 0 1 # last\r\n\
                  vt 0 0\r\nf 1/1 2/1 -1/1\r\nusemtl paint\r\n";
     let given = scan(input);
-    assert_eq!(given.format, FileFormat::Obj);
+    assert_eq!(given.format(), FileFormat::Obj);
     assert_eq!(points(&given), [DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0)]);
     assert_eq!(
         given.given_normals.as_ref().unwrap()[..],
@@ -130,7 +130,7 @@ fn lines_that_end_with_a_carriage_return_and_marks() {
         &Silent,
     )
     .unwrap();
-    assert_eq!(unnamed.format, FileFormat::Obj);
+    assert_eq!(unnamed.format(), FileFormat::Obj);
 }
 
 #[test]

@@ -197,11 +197,11 @@ fn only_normals_change_in_place() {
 
     let out = written(&scan(&packed()), &normals, None, "out.pcd");
     let again = scan(&out);
-    assert_eq!(again.file.layout.table().n_rows, 4);
+    assert_eq!(again.layers()[0].file.layout.table().n_rows, 4);
     assert_eq!(again.given_normals.as_ref().unwrap()[..], normals);
     let head = format!("# .PCD v.7\n{}\n{FIELDS}DATA binary_compressed\n", own_comment());
     assert!(out.starts_with(head.as_bytes()) && out.ends_with(b"after"));
-    let rows_of = |scan: &Scan| scan.file.bytes[scan.file.layout.table().start()..].to_vec();
+    let rows_of = |scan: &Scan| scan.layers()[0].file.bytes[scan.layers()[0].file.layout.table().start()..].to_vec();
     let mut expect = rows_of(&scan(&packed()));
     for (row, normal) in [(0, normals[0]), (1, normals[1])] {
         let bytes: Vec<u8> = normal.to_array().iter().flat_map(|value| value.to_le_bytes()).collect();

@@ -44,7 +44,7 @@ fn written(scan: &Scan, normals: &[Vec3], name: &str) -> Vec<u8> {
 fn grids_are_read_with_their_poses() {
     let scan = scan(&two_grids());
     assert_eq!(
-        (scan.format, scan.cloud.n_points(), scan.n_left_out),
+        (scan.format(), scan.cloud.n_points(), scan.n_left_out),
         (FileFormat::Ptx, 5, 1)
     );
     let expected = [

@@ -42,12 +42,18 @@ pub struct ScanIdentity {
     pub n_points: u64,
     /// The names that a text's columns were given ([`crate::ReadOptions::columns`]); `None` where it was read as it is.
     pub columns: Option<Vec<String>>,
+    /// Of a scan of several files, each of them in order, and the fields above are of all: sizes and points added up, and the hash that
+    /// of the files' hashes. Empty for one file.
+    pub files: Vec<ScanIdentity>,
 }
 
 impl ScanIdentity {
     /// Whether the content is the same and was read in the same way, wherever the files are.
     pub fn is_same_content(&self, other: &Self) -> bool {
+        let is_same = |(a, b): (&Self, &Self)| a.is_same_content(b);
         (self.n_bytes, self.hash, &self.columns) == (other.n_bytes, other.hash, &other.columns)
+            && self.files.len() == other.files.len()
+            && self.files.iter().zip(&other.files).all(is_same)
     }
 }
 

@@ -220,7 +220,7 @@ fn all_versions_and_formats_are_read_as_another_reader_does() {
         let sample = Sample::new(minor, format, 300).with_extra(&[("height", Scalar::Double)]);
         let bytes = sample.bytes();
         let scan = scan(&bytes, "a.las");
-        assert_eq!((scan.cloud.n_points(), scan.format), (300, FileFormat::Las));
+        assert_eq!((scan.cloud.n_points(), scan.format()), (300, FileFormat::Las));
         let values = |name: &str| scan.scalar(name, &Silent).unwrap();
         let known = points(&bytes);
         let check = |name: &str, of: &dyn Fn(&las::Point) -> f64| {
