@@ -441,8 +441,8 @@ fn wrong_use_is_refused_before_anything_is_written() {
     check("orient a.ply -o out.ply --threads 0", &["1"]);
     check("orient a.ply -o out.ply --rule inward", &["outward", "into-room"]);
     check(
-        "orient a.ply -o out.ply --rule toward-scanner",
-        &["--scanner", "--sensors"],
+        "orient a.ply -o out.ply --rule toward-scanner --no-stations",
+        &["--no-stations"],
     );
     check("orient a.ply -o out.ply --scanner 1,2", &["three numbers"]);
     check(

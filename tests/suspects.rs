@@ -150,5 +150,5 @@ fn wrong_use_is_refused() {
     check("orient scan.ply -o out.ply --confidence --start keep", "--start keep");
     check("suspects scan.ply --threshold 2", "from 0 to 1");
     check("suspects scan.ply --json scan.ply", "another name");
-    check("suspects scan.ply --rule toward-scanner", "--scanner");
+    check("suspects scan.ply --rule toward-scanner --no-stations", "--no-stations");
 }

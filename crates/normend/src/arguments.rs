@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod convert;
 pub mod replay;
+pub mod scanner;
 pub mod suspects;
 
 use std::fmt;
@@ -11,17 +12,16 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Args, CommandFactory, Parser, Subcommand};
-use glam::DVec3;
-use normend_core::evidence::Station;
 use normend_core::propagation::{ETA, VIEWS};
 use normend_core::shapes::ShapeKind;
 use normend_core::{EdgeRule, Estimator, Method, Parameters, Preset, SideRule, SourceRule, Start};
-use normend_io::{ReadError, ReadOptions, Scan};
+use normend_io::ReadOptions;
 use normend_render::{DisplayMode, StandardView, UpAxis};
 
 use self::bench::BenchArguments;
 use self::convert::ConvertArguments;
 use self::replay::{RehearseArguments, ReplayArguments};
+use self::scanner::ScannerArguments;
 use self::suspects::SuspectsArguments;
 use crate::commands::render::{PaletteName, PictureSize};
 
@@ -250,49 +250,6 @@ pub struct PropagationArguments {
     pub rule: Option<SideRule>,
 }
 
-/// Where the scanner stood.
-#[derive(Clone, Debug, Default, Args)]
-pub struct ScannerArguments {
-    /// Where the scanner stood that measured all points, in the scan's coordinates
-    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true, conflicts_with = "sensors")]
-    pub scanner: Option<DVec3>,
-
-    /// Table of the scanner's places: lines of first point (from 0), count, x, y, z
-    #[arg(long, value_name = "TSV")]
-    pub sensors: Option<PathBuf>,
-}
-
-impl ScannerArguments {
-    /// Whether a place was given.
-    pub fn is_given(&self) -> bool {
-        self.scanner.is_some() || self.sensors.is_some()
-    }
-
-    /// The scanner's places for `scan`.
-    ///
-    /// # Errors
-    /// A table that cannot be read or is not of this scan.
-    pub fn stations(&self, scan: &Scan) -> Result<Vec<Station>, ReadError> {
-        match (&self.scanner, &self.sensors) {
-            (Some(position), _) => Ok(vec![Station {
-                points: 0..scan.cloud.n_points() as u32,
-                position: *position,
-            }]),
-            (None, Some(path)) => normend_io::read_stations(path, scan),
-            (None, None) => Ok(Vec::new()),
-        }
-    }
-}
-
-/// Parses three finite coordinates.
-fn place(typed: &str) -> Result<DVec3, String> {
-    let parsed: Option<Vec<f64>> = typed.split(',').map(|number| number.trim().parse().ok()).collect();
-    match parsed.as_deref() {
-        Some(&[x, y, z]) if DVec3::new(x, y, z).is_finite() => Ok(DVec3::new(x, y, z)),
-        _ => Err("type three numbers, as in 1.5,0,-2".to_owned()),
-    }
-}
-
 impl PropagationArguments {
     /// The first flag that was typed and that the automatic method has no use for.
     fn of_tree(&self) -> Option<&'static str> {
@@ -363,12 +320,15 @@ The report (--json) has a line for each input: an object with input, output, poi
 coordinates), components, sources (places where signs start), voted_sources (those found by visibility), \
 without_evidence (components that no evidence tells the side of), undecided (points whose sign is no more than a guess; null \
 where the method does not know), rule (what decided the sides, in words), lost (what the output's format cannot hold), found_station ([x, y, z] where all was scanned from, \
-if --rule auto found it, else null), parameters, seconds (read, neighbors, normals, \
+if --rule auto found it, else null), scanner (the places of the scanner that were known, in words, else null), parameters, seconds (read, neighbors, normals, \
 sources where voted, graph, tree, signs, write, total) and peak_rss_bytes (of the program so far; null where the system \
 does not tell). A failed input has input and error.
 
-The right side of each component (--rule) is decided by the scanner's place where all was scanned from one place and that is \
-found, and else as by outward (auto); by what is seen of it from outside (outward), by the scanner's place \
+Where the scanner was is read from the scan (E57, PTX, PCD), from SCAN.sensors.tsv or SCAN.trajectory.txt beside it, or from \
+what --scanner, --sensors or --trajectory name; points face the place that they were measured from.
+
+The right side of each component (--rule) is decided by the scanner's places where they are known, or all was scanned from one \
+place and that is found, and else as by outward (auto); by what is seen of it from outside (outward), by the scanner's place \
 (toward-scanner), by +z (up), by what is seen from within (into-room), or by the file's normals (given); where that says \
 nothing, by what is seen from outside.
 
@@ -378,7 +338,8 @@ Examples:
   normend orient scan.ply -o oriented.ply --estimator pca --k-graph 6 --json - | jq .seconds
   normend orient meshlab.ply -o filled.ply --start keep
   normend orient room.ply -o oriented.ply --rule into-room
-  normend orient tower.ply -o oriented.ply --scanner 1.5,0,-2")]
+  normend orient tower.ply -o oriented.ply --scanner 1.5,0,-2
+  normend orient drive.laz -o oriented.laz --trajectory drive.csv")]
 pub struct OrientArguments {
     /// Scans to orient: PLY, or XYZ text
     #[arg(required = true, value_name = "IN")]
@@ -594,6 +555,8 @@ where
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
 
     #[test]

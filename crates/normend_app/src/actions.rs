@@ -60,8 +60,9 @@ impl App {
                     session.draft = parameters;
                     session.requested = parameters;
                     session.requested_viewpoints = Arc::clone(&session.document.state().viewpoints);
+                    session.requested_scanner = session.document.state().scanner.clone();
                     let uploader = self.scene.as_ref().map(Scene::uploader);
-                    let work = Work::propagate(&self.ctx, &session.document, parameters, true, uploader);
+                    let work = Work::propagate(&self.ctx, session, parameters, true, uploader);
                     self.work = Some(work);
                 }
             }
@@ -87,6 +88,7 @@ impl App {
             }
             Action::DropKind(kind) => self.drop_kind(kind),
             Action::Viewpoints(action) => self.act_on_viewpoints(action),
+            Action::Scanner(action) => self.act_on_scanner(action),
             Action::Components(action) => self.act_on_components(action),
             Action::Suspects(action) => self.review(action),
             Action::CancelJob => {
@@ -384,7 +386,8 @@ impl App {
         }
         let (wanted, is_due) = (session.document.parameters(), session.is_due());
         let places = &session.document.state().viewpoints;
-        let are_new = *places != session.requested_viewpoints;
+        let scanner = &session.document.state().scanner;
+        let are_new = *places != session.requested_viewpoints || *scanner != session.requested_scanner;
         match &self.work {
             None if wanted != session.requested => {}
             None if is_due && are_new => {}
@@ -399,10 +402,11 @@ impl App {
         }
         (session.draft, session.requested) = (wanted, wanted);
         session.requested_viewpoints = Arc::clone(places);
+        session.requested_scanner = scanner.clone();
         self.work = None;
         if is_due {
             let uploader = self.scene.as_ref().map(Scene::uploader);
-            let work = Work::propagate(&self.ctx, &session.document, wanted, false, uploader);
+            let work = Work::propagate(&self.ctx, session, wanted, false, uploader);
             self.work = Some(work);
         }
     }
@@ -579,8 +583,15 @@ impl App {
         if let ScanOrigin::File(path) = origin {
             self.settings.settings.remember_scan(path);
         }
-        let Opened { scan, findings } = opened.result;
-        let session = Session::new(scan, origin.name());
+        let Opened { scan, places, findings } = opened.result;
+        let mut session = Session::new(scan, origin.name());
+        for note in &places.notes {
+            self.messages.note(format!("{}.", sentence(note).trim_end_matches('.')));
+        }
+        if let Some(words) = places.words() {
+            self.messages.info(format!("{}: normals face them.", sentence(&words).trim_end_matches('.')));
+        }
+        session.scanner.places = places;
         self.recipe_job = None;
         let before = self.session.take();
         let is_again = (before.as_ref()).is_some_and(|before| before.identity().is_same_content(&session.identity()));
@@ -621,8 +632,10 @@ impl App {
 
     /// Whether a propagation is made as the document wants it now.
     fn is_wanted(&self, propagation: &Propagation) -> bool {
-        self.document().is_some_and(|document| {
-            document.parameters() == propagation.parameters && document.state().viewpoints == propagation.viewpoints
+        self.session.as_ref().is_some_and(|session| {
+            let document = &session.document;
+            let has_places = document.state().viewpoints == propagation.viewpoints && session.has_places_of(propagation);
+            document.parameters() == propagation.parameters && has_places
         })
     }
 

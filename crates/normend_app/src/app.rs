@@ -27,6 +27,7 @@ use crate::scene_sync::Scene;
 use crate::selection::Selecting;
 use crate::session::Session;
 use crate::settings::{SettingsStore, WindowPlace};
+use crate::source_kinds::SourceKind;
 use crate::suspect_pictures::SuspectPictures;
 use crate::suspects_list::Standing;
 use crate::theme;
@@ -425,6 +426,7 @@ impl App {
                                 viewport,
                                 comparing,
                                 palette,
+                                scanner: session.has_scanner().then(|| session.kinds.is_shown(SourceKind::Scanner)),
                             }
                             .ui(ui),
                             SideTab::History => history::ui(ui, session),
@@ -449,6 +451,7 @@ impl App {
                     if let Some(session) = &self.session {
                         action = suspects::card(ui, area, &session.suspects).or(action);
                     }
+                    self.scanner_marks(ui);
                     action = self.viewpoint_marks(ui).or(action);
                 } else if self.work.is_none() {
                     action = empty::ui(ui, &self.settings.settings.recent, dialogs::can_drop());
@@ -587,6 +590,7 @@ impl eframe::App for App {
         self.keep_oriented();
         self.keep_shown();
         self.keep_components();
+        self.keep_scanner();
         self.keep_suspects();
         self.take_drops();
         self.take_keys();

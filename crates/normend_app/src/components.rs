@@ -256,7 +256,11 @@ fn decide(
             });
             let known = Known {
                 given: given.as_ref().map(|normals| normals.as_slice()),
-                stations: station.as_slice(),
+                stations: if station.is_some() {
+                    station.as_slice()
+                } else {
+                    &propagation.stations
+                },
                 ..Known::default()
             };
             let mut clues = Clues::new(&cloud, &propagation.normals, &propagation.splat_radii);

@@ -28,6 +28,7 @@ mod recipes;
 mod review;
 mod run;
 pub mod scalars;
+pub mod scanner_view;
 pub mod scene_sync;
 pub mod selection;
 pub mod session;

@@ -6,7 +6,8 @@ use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use normend_core::document::Step;
+use normend_core::document::{ScannerChoice, Step};
+use normend_core::evidence::{Station, Track};
 use normend_core::{
     Change, Document, Edit, EditError, EditKind, Parameters, PointSet, Propagation, SpanningTree, Start, StateChange,
     confidence,
@@ -17,6 +18,7 @@ use normend_io::recipe::{Event, Head, Recipe, RecordedStep, ScanIdentity};
 use crate::components::Components;
 use crate::journal::Journal;
 use crate::journal::found::Offer;
+use crate::scanner_view::ScannerView;
 use crate::source_kinds::SourceKinds;
 use crate::suspects_list::SuspectsList;
 use crate::viewpoints::Viewpoints;
@@ -71,6 +73,10 @@ pub struct Session {
     pub viewpoints: Viewpoints,
     /// The viewpoints of the running propagation, or of the last one when none runs.
     pub requested_viewpoints: Arc<[glam::Vec3]>,
+    /// Where the scanner was, by the files, and what it says of the points.
+    pub scanner: ScannerView,
+    /// What of the scanner's places the running propagation was to use, or the last one when none runs.
+    pub requested_scanner: ScannerChoice,
     /// The end of the intervals of votes while it is dragged.
     pub eta_draft: Option<f32>,
 }
@@ -111,6 +117,8 @@ impl Session {
             components: Components::default(),
             viewpoints: Viewpoints::default(),
             requested_viewpoints: Arc::default(),
+            scanner: ScannerView::default(),
+            requested_scanner: ScannerChoice::default(),
             eta_draft: None,
             scan: Arc::new(scan),
             name,
@@ -133,7 +141,31 @@ impl Session {
             return true;
         };
         let has_old_votes = propagation.votes.is_some() && self.document.state().viewpoints != propagation.viewpoints;
-        self.document.parameters() != propagation.parameters || has_old_votes
+        self.document.parameters() != propagation.parameters || has_old_votes || !self.has_places_of(propagation)
+    }
+
+    /// The places of the scanner that the document wants: those that came with the scan, unless they are to count for nothing, then
+    /// the user's own.
+    pub fn stations(&self) -> impl Iterator<Item = &Station> {
+        let choice = &self.document.state().scanner;
+        let of_file = self.scanner.places.stations.iter().filter(|_| !choice.without_file);
+        of_file.chain(choice.own.iter())
+    }
+
+    /// The way of the scanner that came with the scan, unless it is to count for nothing.
+    pub fn track(&self) -> Option<&Arc<Track>> {
+        let is_wanted = !self.document.state().scanner.without_file;
+        self.scanner.places.track.as_ref().filter(|_| is_wanted)
+    }
+
+    /// Whether the document wants any place of the scanner.
+    pub fn has_scanner(&self) -> bool {
+        self.stations().next().is_some() || self.track().is_some()
+    }
+
+    /// Whether a propagation was made with the scanner's places that the document wants.
+    pub fn has_places_of(&self, propagation: &Propagation) -> bool {
+        propagation.has_track == self.track().is_some() && propagation.stations.iter().eq(self.stations())
     }
 
     /// Whether there are mends among what is unsaved; else other parameters alone.
@@ -443,7 +475,7 @@ impl Session {
 fn is_interaction(kind: EditKind) -> bool {
     !matches!(
         kind,
-        EditKind::SetParameters | EditKind::SetViewpoints | EditKind::Accept
+        EditKind::SetParameters | EditKind::SetViewpoints | EditKind::SetScanner | EditKind::Accept
     )
 }
 

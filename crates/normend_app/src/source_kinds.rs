@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use egui::Color32;
-use normend_core::document::FlipReason;
+use normend_core::document::{FlipReason, ScannerChoice};
 use normend_core::sources::Origin;
 use normend_core::{Document, Edit, SideRule, SourceRule, SpanningTree, Start};
 
@@ -30,7 +30,7 @@ pub enum SourceKind {
     Pinned,
     /// Viewpoints.
     Voted,
-    /// The place that the scan was found to be taken from.
+    /// The places that the scan was taken from, known or found.
     Scanner,
     /// The normals that came with the file.
     File,
@@ -97,7 +97,8 @@ impl SourceKind {
             }
             Self::Pinned => "Points that you pinned as right. Nothing turns them until you unpin them.",
             Self::Voted => "Points that viewpoints around the scan see clearly. Those that you make overrule them.",
-            Self::Scanner => "The one place that the scan was taken from, found from the points. Normals face it.",
+            Self::Scanner => "The places that the scan was taken from: of its file, a table beside it or your own, or the one that the points tell. \
+                 Normals face them.",
             Self::File => "The normals that came with the file, and their sides.",
         }
     }
@@ -109,7 +110,7 @@ impl SourceKind {
             Self::Flipped => "Flip these points back",
             Self::Pinned => "Unpin these points; nothing turns",
             Self::Voted => "Orient again without votes: the highest point of each part points up",
-            Self::Scanner => "Orient again without the scanner's place: normals point outward",
+            Self::Scanner => "Orient again without the scanner's places: normals point outward",
             Self::File => "Orient again from estimated normals, not from those of the file",
         }
     }
@@ -170,7 +171,11 @@ impl SourceKinds {
         counts[SourceKind::Flipped as usize] = marks.free().len();
         counts[SourceKind::Pinned as usize] = marks.pinned().len();
         counts[SourceKind::Voted as usize] += propagation.voted_sources.len() as u64;
-        counts[SourceKind::Scanner as usize] = u64::from(propagation.found_station.is_some());
+        counts[SourceKind::Scanner as usize] = u64::from(propagation.found_station.is_some()) + u64::from(propagation.has_track);
+        let mut places: Vec<_> = propagation.stations.iter().map(|station| station.position).collect();
+        // Pieces of one place follow one another.
+        places.dedup();
+        counts[SourceKind::Scanner as usize] += places.len() as u64;
         if propagation.parameters.start == Start::Keep && document.given_normals().is_some() {
             counts[SourceKind::File as usize] = (document.cloud().n_points() - n_without_normal) as u64;
         }
@@ -228,6 +233,13 @@ impl App {
                     ..wanted
                 }),
             ),
+            SourceKind::Scanner if session.has_scanner() => {
+                let none = ScannerChoice {
+                    without_file: true,
+                    ..ScannerChoice::default()
+                };
+                (Some(Edit::SetScanner(none)), None)
+            }
             SourceKind::Scanner => (
                 None,
                 again(normend_core::Parameters {

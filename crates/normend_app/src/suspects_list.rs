@@ -174,6 +174,7 @@ impl SuspectsList {
                 // The file's normals are what is in question, so they are no evidence.
                 let known = Known {
                     given: given.as_ref().map(|normals| normals.as_slice()),
+                    stations: &in_force.stations,
                     ..Known::default()
                 };
                 let part = Part::new(progress, 0.0..0.85);

@@ -14,7 +14,7 @@ use crate::app::App;
 use crate::command::Action;
 use crate::panels::side::SideTab;
 use crate::theme;
-use crate::viewport::{Viewport, ground};
+use crate::viewport::Viewport;
 
 /// Most viewpoints: as many as there are usual ones.
 pub const MOST: usize = *VIEWS.end();
@@ -165,14 +165,7 @@ impl App {
                     theme::accent(ui),
                     false,
                 );
-                let color = ui.visuals().strong_text_color();
-                let font = egui::FontId::proportional(12.0);
-                let words = painter.layout_no_wrap("Scanner".to_owned(), font, color);
-                let padding = Vec2::new(6.0, 2.0);
-                let size = words.size() + 2.0 * padding;
-                let min = at + Vec2::new(-0.5 * size.x, 12.0);
-                ground(ui, &painter, Rect::from_min_size(min, size));
-                painter.galley(min + padding, words, color);
+                crate::scanner_view::named(ui, &painter, at, "Scanner");
             }
         }
         if !Viewpoints::are_asked(document) {
@@ -220,14 +213,14 @@ impl App {
 }
 
 /// The place in the window of a world point; `None` out of the view.
-fn in_view(viewport: &Viewport, place: Vec3) -> Option<Pos2> {
+pub(crate) fn in_view(viewport: &Viewport, place: Vec3) -> Option<Pos2> {
     viewport
         .place(place)
         .filter(|&at| viewport.rect.shrink(4.0).contains(at))
 }
 
 /// The direction in the window from a mark to a world point, unit length or none.
-fn toward(viewport: &Viewport, from: Pos2, to: Vec3) -> Vec2 {
+pub(crate) fn toward(viewport: &Viewport, from: Pos2, to: Vec3) -> Vec2 {
     viewport.place(to).map_or(Vec2::ZERO, |to| (to - from).normalized())
 }
 
@@ -248,7 +241,7 @@ fn moved(viewport: &Viewport, place: Vec3, pixels: glam::Vec2) -> Vec3 {
 }
 
 /// A small camera that looks in a direction of the window.
-fn camera_mark(painter: &egui::Painter, at: Pos2, direction: Vec2, color: Color32, strong: bool) {
+pub(crate) fn camera_mark(painter: &egui::Painter, at: Pos2, direction: Vec2, color: Color32, strong: bool) {
     let halo = Color32::from_black_alpha(170);
     let lens = [at + direction * 7.0, at + direction * 14.0];
     painter.line_segment(lens, Stroke::new(5.0, halo));

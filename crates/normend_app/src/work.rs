@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use normend_core::evidence::Known;
-use normend_core::{Document, Parameters, PointCloud, Propagation, confidence};
-use normend_io::{ReadError, Scan, WriteError, WriteOptions};
+use normend_core::evidence::{Known, Station};
+use normend_core::{Parameters, PointCloud, Propagation, confidence};
+use normend_io::{ReadError, Scan, ScannerFiles, ScannerPlaces, WriteError, WriteOptions};
 use normend_render::{CloudUploader, UploadedCloud};
 
 use crate::job::{Job, JobError, JobStatus};
@@ -80,6 +80,8 @@ pub struct Uploaded<T> {
 pub struct Opened {
     /// The scan.
     pub scan: Scan,
+    /// Where its scanner was, as far as files tell.
+    pub places: ScannerPlaces,
     /// The journals.
     pub findings: Findings,
 }
@@ -138,6 +140,7 @@ impl Work {
                 ReadError::Cancelled(_) => JobError::Cancelled,
                 error => JobError::Failed(without_file(&error.to_string(), &source.display())),
             })?;
+            let places = ScannerPlaces::read(&scan, ScannerFiles::default(), progress).map_err(|_| JobError::Cancelled)?;
             progress.stage("Preparing the picture");
             let cloud = uploader.and_then(|uploader| upload_points(&uploader, &scan.cloud).ok());
             // Hashes the file, and the editor needs that with its first edit.
@@ -145,28 +148,35 @@ impl Work {
             let findings = journals.map_or_else(Findings::default, |folder| {
                 journal::found::find(&folder.path, &identity, folder.patience)
             });
-            let opened = Opened { scan, findings };
+            let opened = Opened {
+                scan,
+                places,
+                findings,
+            };
             Ok(Uploaded { result: opened, cloud })
         });
         Self::Open { job, origin }
     }
 
-    /// Starts to orient `document` with `parameters`.
+    /// Starts to orient the scan of a session with `parameters`.
     pub fn propagate(
         ctx: &egui::Context,
-        document: &Document,
+        session: &Session,
         parameters: Parameters,
         is_asked: bool,
         uploader: Option<CloudUploader>,
     ) -> Self {
+        let document = &session.document;
+        let (stations, track): (Vec<Station>, _) = (session.stations().cloned().collect(), session.track().cloned());
         let cloud: Arc<PointCloud> = Arc::clone(document.cloud());
         let given = document.given_normals().cloned();
         let viewpoints = Arc::clone(&document.state().viewpoints);
         let job = Job::start(ctx, "propagate", "Finding neighbors", move |progress| {
             let known = Known {
                 given: given.as_ref().map(|normals| normals.as_slice()),
+                stations: &stations,
+                track: track.as_deref(),
                 viewpoints: &viewpoints,
-                ..Known::default()
             };
             let propagation = Propagation::new(&cloud, known, parameters, progress)?;
             progress.stage("Preparing the picture");

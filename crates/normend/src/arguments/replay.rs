@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::scanner::ScannerArguments;
 use super::{CommonArguments, PropagationArguments};
 
 /// `normend replay`.
@@ -15,7 +16,8 @@ report.
 
 The recipe must be of IN's very content. Where IN holds the same points in the same order but other values beside them, \
 --same-points allows it. Flags of the method replace parameters of the recipe; what was decided stays as it is, and the rest is \
-oriented anew around it.
+oriented anew around it. Places of the scanner that the editor found with the scan are found again, those that were typed are in the \
+recipe.
 
 The report (--json) has one line, an object with recipe, input, output, points, left_out (rows without finite coordinates), edits, \
 sources, marks (points set for themselves), pinned, same_content, rule (what decided the sides, in words), parameters, seconds \
@@ -45,6 +47,10 @@ pub struct ReplayArguments {
     /// How signs are found, in place of what the recipe says.
     #[command(flatten)]
     pub propagation: PropagationArguments,
+
+    /// Where the scanner stood.
+    #[command(flatten)]
+    pub scanner: ScannerArguments,
 
     /// Write how sure the automatic method is of each normal before any mend: confidence and oriented, as normend orient does
     #[arg(long)]

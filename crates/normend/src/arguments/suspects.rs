@@ -6,7 +6,8 @@ use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use normend_core::{SideRule, suspects};
 
-use super::{CommonArguments, ReadArguments, ScannerArguments, one_of};
+use super::scanner::ScannerArguments;
+use super::{CommonArguments, ReadArguments, one_of};
 
 /// Most suspects that can be asked for: each is a line for a person to read.
 const MOST: u64 = 100_000;

@@ -8,6 +8,7 @@ pub mod generate;
 pub mod orient;
 pub mod render;
 pub mod replay;
+pub mod scanner;
 pub mod suspects;
 
 use std::fmt;

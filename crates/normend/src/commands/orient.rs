@@ -13,7 +13,7 @@ use serde::{Serialize, Serializer};
 
 use super::batch::{Job, Plan, Typed};
 use super::convert::refuse_or_say_losses;
-use super::{Outcome, check_may_write, prepare, say_other_names, wrong_use};
+use super::{Outcome, check_may_write, prepare, say_other_names, scanner, wrong_use};
 use crate::arguments::OrientArguments;
 use crate::console::{self, Bar, counted};
 use crate::memory::peak_rss_bytes;
@@ -37,6 +37,8 @@ struct Oriented {
     lost: Vec<String>,
     /// Where all was scanned from, if that was found.
     found_station: Option<[f64; 3]>,
+    /// The places of the scanner that were known, in words.
+    scanner: Option<String>,
     #[serde(serialize_with = "serialize_parameters")]
     parameters: Parameters,
     seconds: Seconds,
@@ -101,11 +103,7 @@ fn parameters(arguments: &OrientArguments) -> Parameters {
 /// # Errors
 /// Wrong use, in words.
 fn check(arguments: &OrientArguments) -> anyhow::Result<()> {
-    if arguments.propagation.rule == Some(SideRule::TowardScanner) && !arguments.scanner.is_given() {
-        return Err(wrong_use(
-            "the rule toward-scanner needs the scanner's place: give --scanner X,Y,Z or --sensors TSV",
-        ));
-    }
+    scanner::check(&arguments.scanner, arguments.propagation.rule)?;
     let Parameters {
         method,
         start,
@@ -156,12 +154,16 @@ fn orient(job: &Job, parameters: Parameters, arguments: &OrientArguments, bar: &
         ));
     }
 
+    let rule = arguments.propagation.rule;
+    let part = Part::new(bar, 0.1..0.12);
+    let places = scanner::places(&arguments.scanner, rule, &scan, &job.input, bar, &part)?;
     let known = Known {
         given: scan.given_normals.as_ref().map(|normals| normals.as_slice()),
-        stations: &arguments.scanner.stations(&scan)?,
+        stations: &places.stations,
+        track: places.track.as_deref(),
         ..Known::default()
     };
-    let propagation = Propagation::new(&scan.cloud, known, parameters, &Part::new(bar, 0.1..0.9))?;
+    let propagation = Propagation::new(&scan.cloud, known, parameters, &Part::new(bar, 0.12..0.9))?;
     seconds
         .0
         .extend(propagation.seconds.iter().map(|&(stage, secs)| (stage.name(), secs)));
@@ -207,6 +209,7 @@ fn orient(job: &Job, parameters: Parameters, arguments: &OrientArguments, bar: &
         rule,
         lost: losses.iter().map(Loss::to_string).collect(),
         found_station,
+        scanner: places.words(),
         parameters,
         seconds,
         peak_rss_bytes: peak_rss_bytes(),

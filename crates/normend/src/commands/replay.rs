@@ -8,16 +8,16 @@ use anyhow::{Context, anyhow};
 use normend_app::journal::found;
 use normend_app::session::Session;
 use normend_core::confidence::confidence;
-use normend_core::evidence::Known;
+use normend_core::evidence::{Known, Station};
 use normend_core::progress::Part;
 use normend_core::{EditError, Parameters, Progress, Propagation, SideRule, Silent};
 use normend_io::recipe::{self, End, Event, Recipe};
-use normend_io::{ReadOptions, Scan, WriteOptions, is_same_file};
+use normend_io::{ReadOptions, Scan, ScannerFiles, ScannerPlaces, WriteOptions, is_same_file};
 use serde::Serialize;
 
 use super::batch::open_report;
 use super::orient::serialize_parameters;
-use super::{Outcome, check_may_write, check_scan_name, prepare, say_other_names, title_of, wrong_use};
+use super::{Outcome, check_may_write, check_scan_name, prepare, say_other_names, scanner, title_of, wrong_use};
 use crate::arguments::replay::{RehearseArguments, ReplayArguments};
 use crate::console::{self, Bar, counted};
 use crate::memory::peak_rss_bytes;
@@ -110,11 +110,7 @@ pub fn run(arguments: &ReplayArguments) -> anyhow::Result<Outcome> {
 fn check(arguments: &ReplayArguments) -> anyhow::Result<()> {
     let (recipe, input, output) = (&arguments.recipe, &arguments.input, &arguments.output);
     check_scan_name(output, Some(input))?;
-    if arguments.propagation.rule == Some(SideRule::TowardScanner) {
-        return Err(wrong_use(
-            "the rule toward-scanner needs the scanner's place, which no recipe has: use normend orient with --scanner",
-        ));
-    }
+    scanner::check(&arguments.scanner, arguments.propagation.rule)?;
     if is_same_file(recipe, output) || recipe == output {
         return Err(wrong_use("the output would take the place of the recipe: name another"));
     }
@@ -149,11 +145,19 @@ fn replay(arguments: &ReplayArguments, bar: &Bar) -> anyhow::Result<Replayed> {
 
     let orient_started = Instant::now();
     let left_out = scan.n_left_out;
+    let places = scanner::places(&arguments.scanner, None, &scan, &arguments.input, bar, &Part::new(bar, 0.1..0.12))?;
     let mut session = Session::new(scan, title_of(&arguments.input));
+    session.scanner.places = places;
     session.begin_with(recipe.head.parameters);
     session.take_recipe(&recipe)?;
+    if arguments.propagation.rule == Some(SideRule::TowardScanner) && !session.has_scanner() {
+        return Err(anyhow!(
+            "the rule toward-scanner needs the scanner's place, which neither the recipe nor the scan says: give --scanner X,Y,Z, \
+             --sensors TSV or --trajectory FILE"
+        ));
+    }
     let parameters = arguments.propagation.over(session.document.parameters());
-    let propagation = propagation(&session, parameters, &Part::new(bar, 0.1..0.9))?;
+    let propagation = propagation(&session, parameters, &Part::new(bar, 0.12..0.9))?;
     session.install(propagation);
     let sureness = if arguments.confidence {
         let found = session.document.propagation().and_then(confidence);
@@ -246,10 +250,12 @@ fn check_scan(recipe: &Recipe, scan: &Scan, arguments: &ReplayArguments) -> anyh
 /// What the editor would find with these parameters.
 fn propagation(session: &Session, parameters: Parameters, progress: &dyn Progress) -> anyhow::Result<Propagation> {
     let document = &session.document;
+    let stations: Vec<Station> = session.stations().cloned().collect();
     let known = Known {
         given: document.given_normals().map(|normals| normals.as_slice()),
+        stations: &stations,
+        track: session.track().map(|track| &**track),
         viewpoints: &document.state().viewpoints,
-        ..Known::default()
     };
     Ok(Propagation::new(document.cloud(), known, parameters, progress)?)
 }
@@ -264,7 +270,9 @@ pub fn rehearse(arguments: &RehearseArguments) -> anyhow::Result<Outcome> {
     let scan = normend_io::read(&arguments.input, &Silent)?;
     let folder = normend_app::folders::state_folder().context("the system names no folder for journals")?;
     let folder = folder.join("journals");
+    let places = ScannerPlaces::read(&scan, ScannerFiles::default(), &Silent)?;
     let mut session = Session::new(scan, title_of(&arguments.input));
+    session.scanner.places = places;
     session.begin_with(recipe.head.parameters);
     let offer = found::find(&folder, &session.identity(), Duration::ZERO)
         .offers

@@ -14,7 +14,7 @@ use normend_io::Scan;
 use serde::Serialize;
 
 use super::batch::open_report;
-use super::{Outcome, prepare, title_of, wrong_use};
+use super::{Outcome, prepare, scanner, title_of, wrong_use};
 use crate::arguments::suspects::SuspectsArguments;
 use crate::console::{Bar, counted};
 
@@ -49,11 +49,7 @@ struct Row {
 /// # Errors
 /// Wrong use, a file that cannot be read, a report that cannot be written, Ctrl-C.
 pub fn run(arguments: &SuspectsArguments) -> anyhow::Result<Outcome> {
-    if arguments.rule == Some(SideRule::TowardScanner) && !arguments.scanner.is_given() {
-        return Err(wrong_use(
-            "the rule toward-scanner needs the scanner's place: give --scanner X,Y,Z or --sensors TSV",
-        ));
-    }
+    scanner::check(&arguments.scanner, arguments.rule)?;
     if arguments.rule == Some(SideRule::Given) {
         return Err(wrong_use(
             "the rule given would judge the file's normals by themselves: choose another rule",
@@ -69,9 +65,12 @@ pub fn run(arguments: &SuspectsArguments) -> anyhow::Result<Outcome> {
     let mut file = json.map(|path| open_report(path, arguments.overwrite)).transpose()?;
     let bar = Bar::new(&title_of(&arguments.input), arguments.common.quiet);
     let scan = super::read(&arguments.input, &arguments.reading, &bar, &Part::new(&bar, 0.0..0.1))?;
+    let part = Part::new(&bar, 0.1..0.12);
+    let places = scanner::places(&arguments.scanner, arguments.rule, &scan, &arguments.input, &bar, &part)?;
     let known = Known {
         given: scan.given_normals.as_ref().map(|normals| normals.as_slice()),
-        stations: &arguments.scanner.stations(&scan)?,
+        stations: &places.stations,
+        track: places.track.as_deref(),
         ..Known::default()
     };
     let usual = Parameters::default();
@@ -80,7 +79,7 @@ pub fn run(arguments: &SuspectsArguments) -> anyhow::Result<Outcome> {
         rule => rule.unwrap_or(usual.rule),
     };
     let parameters = Parameters { rule, ..usual };
-    let automatic = Propagation::new(&scan.cloud, known, parameters, &Part::new(&bar, 0.1..0.9))?;
+    let automatic = Propagation::new(&scan.cloud, known, parameters, &Part::new(&bar, 0.12..0.9))?;
     let initial;
     let normals = match known.given {
         Some(given) => given,

@@ -13,6 +13,7 @@ use crate::compare::Style;
 
 use crate::components::ComponentAction;
 use crate::panels::export::ExportOrder;
+use crate::scanner_view::ScannerAction;
 use crate::settings::ThemeChoice;
 use crate::source_kinds::SourceKind;
 use crate::suspects_list::SuspectAction;
@@ -86,6 +87,8 @@ pub enum Action {
     ShowKind(SourceKind, bool),
     /// Drop all that is of a kind of sources.
     DropKind(SourceKind),
+    /// Something about the places of the scanner.
+    Scanner(ScannerAction),
     /// Something about viewpoints.
     Viewpoints(ViewpointAction),
     /// Something about components.

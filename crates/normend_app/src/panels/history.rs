@@ -76,7 +76,7 @@ fn words(step: &Step, n_points: u64) -> (String, String) {
                 String::new(),
             );
         }
-        EditKind::SetViewpoints => return (text.to_owned(), String::new()),
+        EditKind::SetViewpoints | EditKind::SetScanner => return (text.to_owned(), String::new()),
         EditKind::Select => {
             let text = match parts(change.selected.len(), before.selected, after.selected) {
                 _ if after.selected == 0 => "Select none",

@@ -32,6 +32,7 @@ pub mod tool_bar;
 pub mod unsaved;
 pub mod values;
 pub mod view;
+pub mod scanner;
 pub mod viewpoints;
 pub mod votes;
 

@@ -3,7 +3,7 @@
 use egui::{Button, Color32, RichText, ScrollArea, Ui, Vec2};
 use normend_core::sources::Origin;
 
-use super::{components, viewpoints, votes};
+use super::{components, scanner, viewpoints, votes};
 use crate::command::{Action, Command};
 use crate::session::Session;
 use crate::source_kinds::SourceKind;
@@ -29,6 +29,7 @@ pub fn ui(ui: &mut Ui, session: &mut Session, blocked: Option<&str>) -> Option<A
         action = action.or(listed);
     }
     if session.document.propagation().is_some() {
+        action = scanner::ui(ui, session, blocked).or(action);
         let voted = theme::section_about(ui, "Votes", votes::ABOUT, |ui| {
             ui.add_enabled_ui(blocked.is_none(), |ui| votes::ui(ui, session)).inner
         });

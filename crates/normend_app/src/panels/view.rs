@@ -12,6 +12,7 @@ use crate::command::{Action, Command};
 use crate::compare::Comparing;
 use crate::paint::Display;
 use crate::settings::{DisplaySettings, HAIR_LENGTHS, HAIR_STEPS, PaletteChoice, SPLAT_SCALES, Settings, ThemeChoice};
+use crate::source_kinds::SourceKind;
 use crate::theme::{self, SPACE_M, SPACE_XS};
 use crate::viewport::Viewport;
 
@@ -32,6 +33,8 @@ pub struct ViewTab<'a> {
     pub comparing: &'a mut Comparing,
     /// The colors in force.
     pub palette: Palette,
+    /// Whether places of the scanner are shown; `None` where there are none.
+    pub scanner: Option<bool>,
 }
 
 impl ViewTab<'_> {
@@ -41,13 +44,19 @@ impl ViewTab<'_> {
         let compared = theme::section_about(ui, "Compare", compare::ABOUT, |ui| {
             compare::ui(ui, self.document, self.comparing)
         });
-        theme::section(ui, "Marks", |ui| marks(ui, &mut self.settings.display));
+        let marked = theme::section(ui, "Marks", |ui| {
+            marks(ui, &mut self.settings.display);
+            let mut shown = self.scanner?;
+            let places = ui.checkbox(&mut shown, "Scanner places");
+            let places = places.on_hover_text("Where the scanner was, with names");
+            places.changed().then_some(Action::ShowKind(SourceKind::Scanner, shown))
+        });
         theme::section(ui, "Cuts", |ui| self.cuts(ui));
         theme::section(ui, "Picture", |ui| self.picture(ui));
         theme::section(ui, "Moving around", |ui| {
             navigation::ui(ui, &mut self.settings.navigation);
         });
-        coloring.or(compared)
+        coloring.or(compared).or(marked)
     }
 
     fn coloring(&mut self, ui: &mut Ui) -> Option<Action> {

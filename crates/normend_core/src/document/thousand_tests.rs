@@ -105,8 +105,8 @@ impl Hand {
                 k_graph: 4 + self.below(9),
                 ..document.parameters()
             }),
-            EditKind::SetScanner => Edit::SetScanner(crate::document::ScannerChoice {
-                without_file: self.0.below(2) == 0,
+            EditKind::SetScanner => Edit::SetScanner(ScannerChoice {
+                without_file: self.below(2) == 0,
                 own: [crate::evidence::Station {
                     points: 0..7,
                     position: self.0.direction(),
