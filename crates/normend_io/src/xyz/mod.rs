@@ -189,11 +189,7 @@ impl XyzLayout {
             for slot in COORDINATES.start..NORMAL.end {
                 name(self.columns[slot], VALUE_NAMES[slot]);
             }
-            let look = self.look(bytes);
-            for (channel, color) in ["red", "green", "blue"].into_iter().enumerate() {
-                name(look.colors.map(|columns| columns[channel]), color);
-            }
-            name(look.intensity, "intensity");
+            self.name_by_look(bytes, &mut names);
         }
         let first = self.sample(bytes).next().unwrap_or_default().trim_ascii();
         let has = |mark: u8| first.contains(&mark);
@@ -220,6 +216,17 @@ impl XyzLayout {
                 })
                 .collect(),
             names,
+        }
+    }
+
+    /// Names intensity and colors that have no names by their look.
+    fn name_by_look(&self, bytes: &[u8], names: &mut [String]) {
+        let look = self.look(bytes);
+        let colors = look.colors.into_iter().flatten().zip(["red", "green", "blue"]);
+        for (column, name) in colors.chain(look.intensity.map(|column| (column, "intensity"))) {
+            if let Some(empty) = names.get_mut(column).filter(|name| name.is_empty()) {
+                *empty = name.to_owned();
+            }
         }
     }
 
@@ -289,7 +296,10 @@ impl Layout for XyzLayout {
 
     fn columns(&self, bytes: &[u8]) -> Vec<Column> {
         let row = self.sample(bytes).next().unwrap_or_default();
-        let names = self.column_names(bytes);
+        let mut names = self.column_names(bytes);
+        if self.by == ColumnsBy::Look {
+            self.name_by_look(bytes, &mut names);
+        }
         let mut columns: Vec<Column> = Vec::new();
         for (index, (value, name)) in Values::new(row, self.decimal).zip(names).enumerate() {
             let value = value.of(row);

@@ -76,6 +76,21 @@ fn columns_without_names_are_told_by_their_look() {
 }
 
 #[test]
+fn columns_go_by_their_look_into_other_formats() {
+    let names = |content: &str| scan(content).scalar_columns();
+    let coordinates = ["Column 1", "Column 2", "Column 3"];
+    let pts = ["intensity", "red", "green", "blue"];
+    assert_eq!(
+        names("2\n1 2 3 -51 10 20 255\n4 5 6 7 0 1 2\n"),
+        [&coordinates[..], &pts].concat()
+    );
+    assert_eq!(
+        names("1 2 3 9 8\n"),
+        [&coordinates[..], &["Column 4", "Column 5"]].concat()
+    );
+}
+
+#[test]
 fn the_caller_names_columns() {
     let content = "1 2 3 4 5 6 7\n11 12 13 14 15 16 17\n";
     let scan = read_named(content, Some("z - y x - value")).unwrap();
