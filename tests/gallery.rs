@@ -113,8 +113,8 @@ fn gallery(choice: ThemeChoice, theme: &'static str) {
         propagation.is_some_and(|propagation| propagation.parameters == estimated)
     });
     gallery.editor.open_tab(SideTab::View);
-    // The sample has neither colors nor other values.
-    let of_the_file = [Coloring::File, Coloring::Scalar];
+    // The sample is one file, with neither colors nor other values.
+    let of_the_file = [Coloring::File, Coloring::Scalar, Coloring::Layers];
     for coloring in Coloring::ALL {
         if coloring != Coloring::Facing && !of_the_file.contains(&coloring) {
             gallery.color(coloring);

@@ -652,7 +652,7 @@ fn a_replay_refuses_what_is_not_meant_and_writes_nothing_else() {
         1,
         "there is no such file",
     );
-    check(&["r.normend", "scan.ply", "-o", "scan.ply"], 2, "is the input");
+    check(&["r.normend", "scan.ply", "-o", "scan.ply"], 2, "is an input");
     check(&["r.normend", "scan.ply", "-o", "r.normend"], 2, "");
     check(
         &["r.normend", "scan.ply", "-o", "out.ply", "--json", "scan.ply"],

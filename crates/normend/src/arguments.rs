@@ -44,6 +44,7 @@ const MAX_POINTS: u64 = 1_000_000_000;
 Examples:
   normend                                       open the editor
   normend scan.ply                              open a scan in the editor
+  normend a.ply b.e57                           open files as layers of one cloud
   normend orient scan.ply -o oriented.ply       orient without a window
   normend check oriented.ply --reference truth.ply
   normend render oriented.ply -o picture.png
@@ -55,11 +56,12 @@ pub struct Arguments {
     #[command(subcommand)]
     pub command: Option<Command>,
 
-    /// Scan to open in the editor: PLY, or XYZ text
-    pub scan: Option<PathBuf>,
+    /// Scan to open in the editor; several files are layers of one cloud
+    #[arg(value_name = "SCAN")]
+    pub scans: Vec<PathBuf>,
 
     /// Restore the edits of the scan that were not exported, without asking
-    #[arg(long, requires = "scan")]
+    #[arg(long, requires = "scans")]
     pub restore: bool,
 }
 
@@ -73,7 +75,7 @@ impl Arguments {
             if is_second_scan {
                 usage_error(
                     None,
-                    "the editor opens one scan at a time; a command (orient, check, …) comes first",
+                    "a command (orient, check, …) comes first, then the files",
                 )
                 .exit()
             }
@@ -322,7 +324,8 @@ without_evidence (components that no evidence tells the side of), undecided (poi
 where the method does not know), rule (what decided the sides, in words), lost (what the output's format cannot hold), found_station ([x, y, z] where all was scanned from, \
 if --rule auto found it, else null), scanner (the places of the scanner that were known, in words, else null), parameters, seconds (read, neighbors, normals, \
 sources where voted, graph, tree, signs, write, total) and peak_rss_bytes (of the program so far; null where the system \
-does not tell). A failed input has input and error.
+does not tell). A failed input has input and error. With --together components, sources, times and the like are those of the whole \
+cloud in each line, and one input that cannot be read fails all.
 
 Where the scanner was is read from the scan (E57, PTX, PCD), from SCAN.sensors.tsv or SCAN.trajectory.txt beside it, or from \
 what --scanner, --sensors or --trajectory name; points face the place that they were measured from.
@@ -337,6 +340,7 @@ Examples:
   normend orient a.ply b.xyz -o oriented/ --json report.jsonl
   normend orient scan.ply -o oriented.ply --estimator pca --k-graph 6 --json - | jq .seconds
   normend orient meshlab.ply -o filled.ply --start keep
+  normend orient nave.laz tower.e57 --together -o oriented/
   normend orient room.ply -o oriented.ply --rule into-room
   normend orient tower.ply -o oriented.ply --scanner 1.5,0,-2
   normend orient drive.laz -o oriented.laz --trajectory drive.csv")]
@@ -365,6 +369,10 @@ pub struct OrientArguments {
     /// side is no more than a guess). For the preset auto; to PLY from PLY, or text whose columns have names
     #[arg(long)]
     pub confidence: bool,
+
+    /// Orient all inputs as one cloud, parts of one scan in the same coordinates; each is written to its own file
+    #[arg(long)]
+    pub together: bool,
 
     /// Refuse to write what the output's format cannot hold all of
     #[arg(long)]

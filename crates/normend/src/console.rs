@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use normend_core::{Cancelled, Progress};
-use normend_io::{ReadError, WriteError};
+use normend_io::{NotAllWritten, ReadError, WriteError};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
@@ -123,7 +123,7 @@ pub fn in_words(error: &anyhow::Error) -> String {
             None => cause.to_string(),
         });
         // The errors of files tell their causes themselves.
-        if cause.is::<ReadError>() || cause.is::<WriteError>() {
+        if cause.is::<ReadError>() || cause.is::<WriteError>() || cause.is::<NotAllWritten>() {
             break;
         }
     }

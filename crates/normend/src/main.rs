@@ -37,7 +37,7 @@ fn main() -> ExitCode {
 fn run(arguments: Arguments) -> anyhow::Result<Outcome> {
     match arguments.command {
         None => {
-            if let Some(scan) = &arguments.scan
+            if let Some(scan) = arguments.scans.first()
                 && is_mistyped_command(scan)
             {
                 return Err(wrong_use(format!(
@@ -45,7 +45,7 @@ fn run(arguments: Arguments) -> anyhow::Result<Outcome> {
                     scan.display()
                 )));
             }
-            normend_app::run(arguments.scan, arguments.restore)?;
+            normend_app::run(arguments.scans, arguments.restore)?;
             Ok(Outcome::Done)
         }
         Some(Command::Orient(arguments)) => orient::run(arguments),

@@ -11,7 +11,7 @@ use crate::compare::Style;
 use crate::crash;
 use crate::dialogs::{DialogAnswer, DialogPurpose};
 use crate::job::JobError;
-use crate::panels::export::{ExportOrder, ExportWindow};
+use crate::panels::export::ExportOrder;
 use crate::panels::modal::Modal;
 use crate::panels::open_path::{OpenPathWindow, What};
 use crate::panels::palette::PaletteWindow;
@@ -47,6 +47,9 @@ impl App {
             },
             Action::OpenRecipe(path) => self.open_recipe(&path),
             Action::OpenScan(path) => self.leave(Leaving::Open(ScanOrigin::File(path))),
+            Action::OpenFiles(paths) => self.open_files(paths),
+            Action::AddFiles(paths) => self.add_files(paths),
+            Action::Layers(action) => self.act_on_layers(action),
             Action::Display(coloring) => self.set_coloring(coloring),
             Action::SelectValues { range, modifiers } => self.select_values(range, modifiers),
             Action::Compare(style) => self.toggle_compare(style),
@@ -101,15 +104,13 @@ impl App {
                     self.dialogs.pick_target(&self.ctx, std::path::Path::new(window.path()));
                 }
             }
-            Action::ExportTo(mut order) => {
+            Action::ExportTo(order) => {
                 if let Err(reason) = self.availability(Command::Export) {
                     self.messages.error(format!("Nothing was exported: {reason}."));
                     return;
                 }
                 let Some(session) = &self.session else { return };
-                // A relative path means the folder that the editor was started in; the message names it in full.
-                order.path = std::path::absolute(&order.path).unwrap_or(order.path);
-                self.work = Work::export(&self.ctx, session, order);
+                self.work = Work::export(&self.ctx, session, order.absolute());
             }
         }
     }
@@ -118,7 +119,10 @@ impl App {
         match command {
             Command::Open => self
                 .dialogs
-                .pick_scan(&self.ctx, self.settings.settings.folder(Purpose::Open)),
+                .pick_scans(&self.ctx, self.settings.settings.folder(Purpose::Open), false),
+            Command::AddFiles => self
+                .dialogs
+                .pick_scans(&self.ctx, self.settings.settings.folder(Purpose::Open), true),
             Command::OpenPath => {
                 self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(What::Scan, None)));
             }
@@ -130,15 +134,7 @@ impl App {
             }
             Command::SaveRecipe => self.ask_recipe_target(),
             Command::OpenSample => self.leave(Leaving::Open(ScanOrigin::Sample)),
-            Command::Export => {
-                if let Some(session) = &self.session {
-                    let suggested = session.suggested_export(self.settings.settings.folder(Purpose::Export));
-                    let window = ExportWindow::new(&suggested, session.scan.path().cloned())
-                        .with_changed_input(session.scan.is_changed_on_disk());
-                    let window = window.with_confidence(session.knows_confidence());
-                    self.windows.modal = Some(Modal::Export(window));
-                }
-            }
+            Command::Export => self.ask_export_target(),
             Command::Quit => self.ctx.send_viewport_cmd(egui::ViewportCommand::Close),
             Command::Undo => self.step_history(Session::undo),
             Command::Redo => self.step_history(Session::redo),
@@ -253,6 +249,7 @@ impl App {
             Command::OpenReferencePath => {
                 self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(What::Reference, None)));
             }
+            Command::Columns => self.ask_columns(),
             Command::Screenshot => self.ask_picture(false),
             Command::Turntable => self.ask_picture(true),
             Command::NextWrong => self.next_wrong(true),
@@ -294,7 +291,7 @@ impl App {
         let windows = &mut self.windows;
         if let Some(modal) = windows.modal.take() {
             match modal {
-                Modal::Export(_) => self.after_export = None,
+                Modal::Export(_) | Modal::ExportLayers(_) => self.after_export = None,
                 Modal::Restore => self.decide_later(),
                 _ => {}
             }
@@ -412,7 +409,7 @@ impl App {
     }
 
     /// Leaves the document behind, after asking if it has mends that no exported file has.
-    fn leave(&mut self, leaving: Leaving) {
+    pub(crate) fn leave(&mut self, leaving: Leaving) {
         if self.is_unsaved() {
             self.windows.modal = Some(Modal::Unsaved(leaving));
         } else {
@@ -439,7 +436,10 @@ impl App {
         }
         // A job that runs is dropped here, so its result cannot arrive.
         let uploader = self.scene.as_ref().map(Scene::uploader);
-        self.work = Some(Work::open(&self.ctx, origin, self.journal_folder(), uploader));
+        let files = origin.paths().iter().cloned().map(ScanOrigin::File);
+        let options = files.map(|file| self.settings.settings.read_options(&file)).collect();
+        self.added = None;
+        self.work = Some(Work::open(&self.ctx, origin, options, self.journal_folder(), uploader));
     }
 
     pub(crate) fn take_dialogs(&mut self) {
@@ -447,10 +447,23 @@ impl App {
             let note = "This system shows no file dialog (it needs a desktop portal or zenity). Type the path instead.";
             match (purpose, answer) {
                 (_, DialogAnswer::Cancelled) => {}
-                (DialogPurpose::Open, _) if self.windows.modal.is_some() => {
+                (DialogPurpose::Open | DialogPurpose::Add, _) if self.windows.modal.is_some() => {
                     self.messages.note("No scan was opened: answer the open window first.");
                 }
                 (DialogPurpose::Open, DialogAnswer::Picked(path)) => self.act(Action::OpenScan(path)),
+                (DialogPurpose::Open, DialogAnswer::Several(paths)) => self.act(Action::OpenFiles(paths)),
+                (DialogPurpose::Add, DialogAnswer::Picked(path)) => self.act(Action::AddFiles(vec![path])),
+                (DialogPurpose::Add, DialogAnswer::Several(paths)) => self.act(Action::AddFiles(paths)),
+                (DialogPurpose::Add, DialogAnswer::Unavailable) => {
+                    self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(What::Layer, Some(note.to_owned()))));
+                }
+                (DialogPurpose::ExportFolder, DialogAnswer::Picked(folder)) => {
+                    if let Some(Modal::ExportLayers(window)) = &mut self.windows.modal {
+                        window.set_folder(&folder);
+                    }
+                }
+                // Only scans are picked several at a time.
+                (_, DialogAnswer::Several(_)) => {}
                 (DialogPurpose::Open, DialogAnswer::Unavailable) => {
                     self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(What::Scan, Some(note.to_owned()))));
                 }
@@ -484,9 +497,10 @@ impl App {
                         window.set_path(&path);
                     }
                 }
-                (DialogPurpose::Export | DialogPurpose::SaveRecipe, DialogAnswer::Unavailable) => {
-                    self.messages.note(note)
-                }
+                (
+                    DialogPurpose::Export | DialogPurpose::ExportFolder | DialogPurpose::SaveRecipe,
+                    DialogAnswer::Unavailable,
+                ) => self.messages.note(note),
             }
         }
     }
@@ -540,8 +554,9 @@ impl App {
                     if let Some(session) = &mut self.session {
                         session.mark_saved(revision);
                         let n_points = theme::counted(session.scan.cloud.n_points() as u64, "point", "points");
+                        let paths: Vec<String> = order.paths().map(|path| path.display().to_string()).collect();
                         self.messages
-                            .info(format!("Exported {n_points} to {}.", order.path.display()));
+                            .info(format!("Exported {n_points} to {}.", paths.join(", ")));
                     }
                     if let Some(leaving) = self.after_export.take() {
                         self.leave(leaving);
@@ -560,14 +575,16 @@ impl App {
 
     /// Asks for the target once more after an export failed, with the same path and the reason.
     fn export_again(&mut self, order: &ExportOrder, reason: &str) {
-        let name = ScanOrigin::File(order.path.clone()).name();
-        let problem = format!("{} {} was not written.", sentence(reason), theme::elided(&name, 48));
+        let name = order.words();
+        let not_written = if order.further.is_empty() {
+            "was not written"
+        } else {
+            "were not all written"
+        };
+        let problem = format!("{} {} {not_written}.", sentence(reason), theme::elided(&name, 48));
         self.messages.log_error(problem.clone());
         let Some(session) = &self.session else { return };
-        let window = ExportWindow::after_failure(order, session.scan.path().cloned(), problem)
-            .with_changed_input(session.scan.is_changed_on_disk())
-            .with_confidence(session.knows_confidence());
-        self.windows.modal = Some(Modal::Export(window));
+        self.windows.modal = Some(Self::export_window_after(session, order, problem));
     }
 
     fn say_why(&mut self, what: &str, error: JobError) {
@@ -580,7 +597,7 @@ impl App {
     }
 
     fn show_scan(&mut self, opened: Uploaded<Opened>, origin: &ScanOrigin) {
-        if let ScanOrigin::File(path) = origin {
+        for path in origin.paths() {
             self.settings.settings.remember_scan(path);
         }
         let Opened { scan, places, findings } = opened.result;
@@ -589,10 +606,14 @@ impl App {
             self.messages.note(format!("{}.", sentence(note).trim_end_matches('.')));
         }
         if let Some(words) = places.words() {
-            self.messages.info(format!("{}: normals face them.", sentence(&words).trim_end_matches('.')));
+            self.messages.info(format!(
+                "{}: normals face them.",
+                sentence(&words).trim_end_matches('.')
+            ));
         }
         session.scanner.places = places;
         self.recipe_job = None;
+        let carried = self.state_to_carry(origin, &session.scan);
         let before = self.session.take();
         let is_again = (before.as_ref()).is_some_and(|before| before.identity().is_same_content(&session.identity()));
         if let Some(before) = before {
@@ -616,11 +637,13 @@ impl App {
             ));
         }
         let parameters = session.draft;
-        let path = session.scan.path().cloned();
-        crash::set_scan(path.map_or_else(|| origin.clone(), ScanOrigin::File));
+        crash::set_scan(origin.clone());
         self.session = Some(session);
         self.act(Action::Propagate(parameters));
         self.begin_journal();
+        if let Some(state) = &carried {
+            self.carry_on(state);
+        }
         if is_again {
             // These hold the locks of those that are to be found.
             drop(findings);
@@ -628,13 +651,15 @@ impl App {
         } else {
             self.take_findings(findings);
         }
+        self.ask_doubtful_columns();
     }
 
     /// Whether a propagation is made as the document wants it now.
     fn is_wanted(&self, propagation: &Propagation) -> bool {
         self.session.as_ref().is_some_and(|session| {
             let document = &session.document;
-            let has_places = document.state().viewpoints == propagation.viewpoints && session.has_places_of(propagation);
+            let has_places =
+                document.state().viewpoints == propagation.viewpoints && session.has_places_of(propagation);
             document.parameters() == propagation.parameters && has_places
         })
     }

@@ -11,13 +11,14 @@ use crate::command::{Action, Command, Keymap, take_shortcuts};
 use crate::compare::Comparing;
 use crate::crash;
 use crate::dialogs::{self, Dialogs};
+use crate::layers::Added;
 use crate::messages::Messages;
 use crate::paint::Display;
 use crate::panels::modal::Modal;
 use crate::panels::proposal::Reply;
 use crate::panels::side::SideTab;
 use crate::panels::{
-    empty, hints, history, menu_bar, messages, orient, progress, proposal, side, sources, status_bar, suspects,
+    empty, hints, history, layers, menu_bar, messages, orient, progress, proposal, side, sources, status_bar, suspects,
     tool_bar, view,
 };
 use crate::popup_keys;
@@ -73,6 +74,8 @@ pub struct App {
     pub(crate) dialogs: Dialogs,
     pub(crate) windows: Windows,
     pub(crate) messages: Messages,
+    /// What files are being added to the open scan.
+    pub(crate) added: Option<Added>,
     /// What to do once the running export is written.
     pub(crate) after_export: Option<Leaving>,
     /// The recipe that is being read or written.
@@ -167,6 +170,7 @@ impl App {
             dialogs: Dialogs::new(),
             windows: Windows::default(),
             messages,
+            added: None,
             after_export: None,
             recipe_job: None,
             restores_unasked: false,
@@ -305,8 +309,8 @@ impl App {
                 .map(|file| file.path().to_path_buf())
                 .collect()
         });
-        if dropped.len() > 1 {
-            self.messages.note("Only the first of the dropped files is opened.");
+        if dropped.len() > 1 && self.windows.modal.is_none() {
+            return self.act(Action::OpenFiles(dropped));
         }
         if let Some(path) = dropped.into_iter().next() {
             if self.windows.modal.is_some() {
@@ -413,7 +417,10 @@ impl App {
                         theme::fit_side_panel(ui, width);
                         side::tabs(ui, &mut settings.side_tab);
                         match settings.side_tab {
-                            SideTab::Orient => orient::ui(ui, session, propagating, blocked),
+                            SideTab::Orient => {
+                                let of_layers = layers::ui(ui, session);
+                                of_layers.or(orient::ui(ui, session, propagating, blocked))
+                            }
                             SideTab::Sources => sources::ui(ui, session, blocked),
                             SideTab::Suspects => {
                                 let list = |ui: &mut Ui| suspects::ui(ui, session, pictures);
@@ -426,7 +433,9 @@ impl App {
                                 viewport,
                                 comparing,
                                 palette,
-                                scanner: session.has_scanner().then(|| session.kinds.is_shown(SourceKind::Scanner)),
+                                scanner: session
+                                    .has_scanner()
+                                    .then(|| session.kinds.is_shown(SourceKind::Scanner)),
                             }
                             .ui(ui),
                             SideTab::History => history::ui(ui, session),

@@ -1,6 +1,7 @@
 //! Which commands can be run now, and why the others cannot.
 
 use normend_core::Document;
+use normend_io::FileFormat;
 
 use crate::app::App;
 use crate::command::Command;
@@ -18,6 +19,19 @@ impl App {
         let check = |holds: bool, reason| if holds { Ok(()) } else { Err(reason) };
         match command {
             Command::Open | Command::OpenPath | Command::OpenSample => check(!exporting, "an export is being written"),
+            Command::AddFiles => {
+                check(document.is_some(), "no scan is open")?;
+                check(self.work.is_none(), "wait for the running work, or cancel it")?;
+                let layers = self.session.as_ref().map_or(&[][..], |session| session.scan.layers());
+                let are_files = layers.iter().all(|layer| layer.path().is_some());
+                check(are_files, "the sample is no file: open a scan of yours first")
+            }
+            Command::Columns => {
+                check(document.is_some(), "no scan is open")?;
+                check(!exporting, "an export is being written")?;
+                let is_text = (self.session.as_ref()).is_some_and(|session| session.scan.format() == FileFormat::Xyz);
+                check(is_text, "the open scan is no text: its format says what is what")
+            }
             Command::Export => {
                 check(document.is_some(), "no scan is open")?;
                 check(self.work.is_none(), "wait for the running work, or cancel it")?;

@@ -29,11 +29,13 @@ pub enum Coloring {
     File,
     /// A column of numbers of the file.
     Scalar,
+    /// Each file of the scan in a color of its own.
+    Layers,
 }
 
 impl Coloring {
     /// All ways, in the order of lists.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Facing,
         Self::Lit,
         Self::Normals,
@@ -42,6 +44,7 @@ impl Coloring {
         Self::Regions,
         Self::File,
         Self::Scalar,
+        Self::Layers,
     ];
 
     /// The name in menus.
@@ -55,6 +58,7 @@ impl Coloring {
             Self::Regions => "Regions",
             Self::File => "Colors of the file",
             Self::Scalar => "Values of the file",
+            Self::Layers => "Layers",
         }
     }
 
@@ -69,6 +73,7 @@ impl Coloring {
             Self::Regions => "What turns together, each region in a color of its own",
             Self::File => "Red, green and blue as the file has them",
             Self::Scalar => "Any column of numbers in the file",
+            Self::Layers => "Each file of the scan in a color of its own",
         }
     }
 
@@ -78,7 +83,9 @@ impl Coloring {
             Self::Facing => DisplayMode::Facing,
             Self::Lit => DisplayMode::Lit,
             Self::Normals => DisplayMode::Normals,
-            Self::Confidence | Self::Conflict | Self::Regions | Self::File | Self::Scalar => DisplayMode::Colors,
+            Self::Confidence | Self::Conflict | Self::Regions | Self::File | Self::Scalar | Self::Layers => {
+                DisplayMode::Colors
+            }
         }
     }
 
@@ -90,6 +97,24 @@ impl Coloring {
     /// Whether its colors change with the signs.
     pub fn depends_on_signs(self) -> bool {
         matches!(self, Self::Conflict | Self::Regions)
+    }
+}
+
+/// Colors of the first files, those of Okabe and Ito's palette that lie between light and dark; further ones are told apart by hue.
+const LAYERS: [[u8; 3]; 6] = [
+    [86, 180, 233],
+    [230, 159, 0],
+    [0, 158, 115],
+    [204, 121, 167],
+    [240, 228, 66],
+    [0, 114, 178],
+];
+
+/// The color of the file with this index, as the renderer takes it.
+pub fn of_layer(index: usize) -> u32 {
+    match LAYERS.get(index) {
+        Some(&[red, green, blue]) => u32::from_le_bytes([red, green, blue, 255]),
+        None => of_region(index as u32),
     }
 }
 

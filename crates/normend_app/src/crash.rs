@@ -215,6 +215,7 @@ fn successor(program: &Path, run: &Run) -> Command {
     command.env_remove(SAMPLE_VARIABLE);
     match &run.scan {
         Some(ScanOrigin::File(path)) => drop(command.arg("--").arg(path)),
+        Some(ScanOrigin::Files(paths)) => drop(command.arg("--").args(paths)),
         Some(ScanOrigin::Sample) => drop(command.env(SAMPLE_VARIABLE, "1")),
         None => {}
     }
@@ -402,6 +403,8 @@ mod tests {
             (arguments.join(" "), value(RESTARTED_VARIABLE), value(SAMPLE_VARIABLE))
         };
         let words = |words: &str| Some(words.to_owned());
+        let files = ScanOrigin::Files(vec!["a.ply".into(), "b.ply".into()]);
+        assert_eq!(check(Some(files), Edits::Kept).0, "-- a.ply b.ply");
         let file = ScanOrigin::File("-a.ply".into());
         assert_eq!(
             check(Some(file), Edits::Kept),

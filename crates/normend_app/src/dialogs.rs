@@ -23,8 +23,12 @@ pub fn can_drop() -> bool {
 /// What a dialog is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DialogPurpose {
-    /// A scan to open.
+    /// A scan to open, of one file or of several.
     Open,
+    /// Files to add to the open scan.
+    Add,
+    /// The folder that the files of a scan are exported to.
+    ExportFolder,
     /// The target of an export.
     Export,
     /// A recipe for the open scan.
@@ -38,12 +42,35 @@ pub enum DialogPurpose {
 /// What became of a dialog.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DialogAnswer {
-    /// The user picked a file.
+    /// The user picked a file, or a folder.
     Picked(PathBuf),
+    /// The user picked several files.
+    Several(Vec<PathBuf>),
     /// The user cancelled.
     Cancelled,
     /// No dialog came up: neither a desktop portal nor zenity answered.
     Unavailable,
+}
+
+/// What a dialog gives.
+trait Picked {
+    fn answer(self) -> DialogAnswer;
+}
+
+impl Picked for rfd::FileHandle {
+    fn answer(self) -> DialogAnswer {
+        DialogAnswer::Picked(self.path().to_path_buf())
+    }
+}
+
+impl Picked for Vec<rfd::FileHandle> {
+    fn answer(self) -> DialogAnswer {
+        match &self[..] {
+            [] => DialogAnswer::Cancelled,
+            [file] => DialogAnswer::Picked(file.path().to_path_buf()),
+            files => DialogAnswer::Several(files.iter().map(|file| file.path().to_path_buf()).collect()),
+        }
+    }
 }
 
 /// Nobody cancels a dialog faster than this; an answer that comes sooner says that there was none.
@@ -67,15 +94,15 @@ impl Dialogs {
         }
     }
 
-    /// Asks for a scan to open. Does nothing while another dialog is open.
-    pub fn pick_scan(&mut self, ctx: &egui::Context, folder: Option<&Path>) {
+    /// Asks for a scan to open, of one file or of several, or for files to add to one. Does nothing while another dialog is open.
+    pub fn pick_scans(&mut self, ctx: &egui::Context, folder: Option<&Path>, adds: bool) {
         let all: Vec<&str> = FileFormat::ALL
             .iter()
             .flat_map(|format| format.extensions())
             .copied()
             .collect();
         let mut dialog = rfd::AsyncFileDialog::new()
-            .set_title("Open a scan")
+            .set_title(if adds { "Add files" } else { "Open a scan" })
             .add_filter("Point clouds", &all);
         for format in FileFormat::ALL {
             dialog = dialog.add_filter(format.label(), format.extensions());
@@ -84,7 +111,17 @@ impl Dialogs {
         if let Some(folder) = folder {
             dialog = dialog.set_directory(folder);
         }
-        self.show(ctx, DialogPurpose::Open, || dialog.pick_file());
+        let purpose = if adds { DialogPurpose::Add } else { DialogPurpose::Open };
+        self.show(ctx, purpose, || dialog.pick_files());
+    }
+
+    /// Asks for the folder that the files of a scan are exported to. Does nothing while another dialog is open.
+    pub fn pick_export_folder(&mut self, ctx: &egui::Context, suggested: &Path) {
+        let mut dialog = rfd::AsyncFileDialog::new().set_title("Export to this folder");
+        if suggested.is_dir() {
+            dialog = dialog.set_directory(suggested);
+        }
+        self.show(ctx, DialogPurpose::ExportFolder, || dialog.pick_folder());
     }
 
     /// Asks for the target of an export, with `suggested` as the start. Does nothing while another dialog is open.
@@ -141,9 +178,9 @@ impl Dialogs {
         self.show(ctx, purpose, || dialog.save_file());
     }
 
-    fn show<F>(&mut self, ctx: &egui::Context, purpose: DialogPurpose, start: impl FnOnce() -> F)
+    fn show<F, P: Picked>(&mut self, ctx: &egui::Context, purpose: DialogPurpose, start: impl FnOnce() -> F)
     where
-        F: Future<Output = Option<rfd::FileHandle>> + Send + 'static,
+        F: Future<Output = Option<P>> + Send + 'static,
     {
         if self.is_open {
             return;
@@ -154,7 +191,7 @@ impl Dialogs {
         let started = Instant::now();
         let spawned = thread::Builder::new().name("normend dialog".to_owned()).spawn(move || {
             let answer = match pollster::block_on(future) {
-                Some(file) => DialogAnswer::Picked(file.path().to_path_buf()),
+                Some(picked) => picked.answer(),
                 None if started.elapsed() < TOO_QUICK => DialogAnswer::Unavailable,
                 None => DialogAnswer::Cancelled,
             };

@@ -55,6 +55,8 @@ pub struct Display {
     columns: Vec<String>,
     column: String,
     has_file_colors: bool,
+    /// The scan is of several files.
+    has_layers: bool,
     range: Option<[f64; 2]>,
     painted: Option<Painted>,
     job: Option<(Request, u64, Job<Painted>)>,
@@ -116,6 +118,7 @@ impl Display {
             column: first.cloned().unwrap_or_default(),
             columns,
             has_file_colors: scan.has_colors(),
+            has_layers: scan.layers().len() > 1,
             points_version: self.points_version + 1,
             ..Self::default()
         };
@@ -151,6 +154,7 @@ impl Display {
                 "only the automatic method knows: choose Estimate and the preset Automatic, then Propagate",
             ),
             Coloring::Conflict | Coloring::Regions => check(propagation.is_some(), "the scan is not oriented yet"),
+            Coloring::Layers => check(self.has_layers, "the scan is of one file"),
             Coloring::File => check(self.has_file_colors, "the file has no colors"),
             Coloring::Scalar => check(!self.columns.is_empty(), "the file has no columns of numbers"),
         }
@@ -444,6 +448,11 @@ impl Subject {
                 let regions = self.regions.as_ref().ok_or_else(|| missing("The orientation"))?;
                 let names = regions.of(0..regions.tree().n_points() as u32);
                 (region_colors(&names), None, None)
+            }
+            Coloring::Layers => {
+                let scan = Arc::clone(&self.scan);
+                let color = move |point: usize| coloring::of_layer(scan.layer_of(point as u32).unwrap_or_default());
+                (self.by_position(color), None, None)
             }
             Coloring::File => {
                 let colors = self.scan.colors(progress).map_err(in_words)?;

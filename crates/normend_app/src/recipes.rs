@@ -216,7 +216,7 @@ impl App {
     }
 
     /// Orients the document with the parameters that it wants after its state was changed as a whole.
-    fn orient_as_wanted(&mut self) {
+    pub(crate) fn orient_as_wanted(&mut self) {
         let Some(session) = &mut self.session else { return };
         let wanted = session.document.parameters();
         session.draft = wanted;

@@ -24,12 +24,12 @@ struct Seen {
     restarted: Option<Result<(), String>>,
 }
 
-/// Opens the editor's window, with `scan` when one is given, and runs until it is closed. Where `restores`, the scan's newest
+/// Opens the editor's window, with a scan of these files when there are any, and runs until it is closed. Where `restores`, its newest
 /// journal is restored without asking.
 ///
 /// # Errors
 /// In words for the user: no display, no graphics driver, and the package that gives it.
-pub fn run(scan: Option<PathBuf>, restores: bool) -> anyhow::Result<()> {
+pub fn run(scans: Vec<PathBuf>, restores: bool) -> anyhow::Result<()> {
     let (mut settings, problem) = SettingsStore::load();
     let news = crash::news(&settings.settings.told_crash);
     if let Some(news) = &news {
@@ -48,7 +48,7 @@ pub fn run(scan: Option<PathBuf>, restores: bool) -> anyhow::Result<()> {
             Box::new(move |cc| {
                 let mut app = App::with_settings(cc, None, settings, problem);
                 let sample = crash::reopens_sample().then_some(ScanOrigin::Sample);
-                if let Some(scan) = scan.map(ScanOrigin::File).or(sample) {
+                if let Some(scan) = ScanOrigin::of_paths(scans).or(sample) {
                     app.open_at_start(scan, restores || crash::was_restarted());
                 }
                 app.say_what_happened(news);

@@ -457,7 +457,13 @@ impl Session {
         let stem = name.file_stem().unwrap_or_default().to_string_lossy();
         let extension = name.extension().map_or_else(
             || {
-                self.scan.format().extensions().first().copied().unwrap_or("ply").to_owned()
+                self.scan
+                    .format()
+                    .extensions()
+                    .first()
+                    .copied()
+                    .unwrap_or("ply")
+                    .to_owned()
             },
             |extension| extension.to_string_lossy().into_owned(),
         );

@@ -8,7 +8,7 @@ use crate::crash::{self, Edits};
 use crate::journal::Journal;
 use crate::panels::modal::Modal;
 use crate::panels::preferences::Preferences;
-use crate::panels::{about, export, messages, open_path, palette, screenshot, shortcuts, unsaved};
+use crate::panels::{about, export, export_layers, messages, open_path, palette, screenshot, shortcuts, unsaved};
 use crate::session::Session;
 
 /// The windows over the editor; `None` or `false` is closed.
@@ -113,6 +113,10 @@ impl App {
                     self.act(action);
                 }
             },
+            Some(Modal::Columns(mut window)) => {
+                let decision = window.ui(ui);
+                self.decide_columns(window, decision);
+            }
             Some(Modal::Restore) => self.ask_offer(ui),
             Some(Modal::SaveRecipe { window, of_offer }) => self.ask_save(ui, window, of_offer),
             Some(Modal::OtherScan { recipe, name }) => self.ask_other_scan(ui, recipe, name),
@@ -126,6 +130,7 @@ impl App {
                 open_path::Decision::Close => {}
                 open_path::Decision::Open(path) => self.act(match window.what {
                     open_path::What::Scan => Action::OpenScan(path),
+                    open_path::What::Layer => Action::AddFiles(vec![path]),
                     open_path::What::Recipe => Action::OpenRecipe(path),
                     open_path::What::Reference => Action::OpenReference(path),
                 }),
@@ -139,6 +144,16 @@ impl App {
                 }
                 export::Decision::Export(order) => self.act(Action::ExportTo(order)),
             },
+            Some(Modal::ExportLayers(mut window)) => match window.ui(ui) {
+                export_layers::Decision::Wait => self.windows.modal = Some(Modal::ExportLayers(window)),
+                export_layers::Decision::Close => self.after_export = None,
+                export_layers::Decision::Browse => {
+                    self.dialogs
+                        .pick_export_folder(&self.ctx, std::path::Path::new(window.folder()));
+                    self.windows.modal = Some(Modal::ExportLayers(window));
+                }
+                export_layers::Decision::Export(order) => self.act(Action::ExportTo(order)),
+            },
             Some(Modal::Unsaved(leaving)) => {
                 let session = self.session.as_ref();
                 let name = session.map_or("this scan", |session| &session.name);
@@ -150,7 +165,7 @@ impl App {
                     unsaved::Decision::Export => {
                         self.act(Command::Export.into());
                         match &self.windows.modal {
-                            Some(Modal::Export(_)) => self.after_export = Some(leaving),
+                            Some(Modal::Export(_) | Modal::ExportLayers(_)) => self.after_export = Some(leaving),
                             _ => self.windows.modal = Some(Modal::Unsaved(leaving)),
                         }
                     }

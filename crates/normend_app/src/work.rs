@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use normend_core::evidence::{Known, Station};
-use normend_core::{Parameters, PointCloud, Propagation, confidence};
-use normend_io::{ReadError, Scan, ScannerFiles, ScannerPlaces, WriteError, WriteOptions};
+use normend_core::progress::Part;
+use normend_core::{Parameters, PointCloud, Progress, Propagation, confidence};
+use normend_io::{ReadError, ReadOptions, Scan, ScannerFiles, ScannerPlaces, WriteError};
 use normend_render::{CloudUploader, UploadedCloud};
 
 use crate::job::{Job, JobError, JobStatus};
@@ -22,6 +23,8 @@ use crate::theme;
 pub enum ScanOrigin {
     /// A file.
     File(PathBuf),
+    /// Several files, as layers of one scan.
+    Files(Vec<PathBuf>),
     /// The scan that comes with the program.
     Sample,
 }
@@ -32,9 +35,33 @@ const SAMPLE: &[u8] = include_bytes!("../../../assets/sample.ply");
 const SAMPLE_NAME: &str = "sample.ply";
 
 impl ScanOrigin {
-    /// The file's name without folders.
+    /// A scan of these files; `None` when there are none.
+    pub fn of_paths(mut paths: Vec<PathBuf>) -> Option<Self> {
+        match paths.len() {
+            0 | 1 => paths.pop().map(Self::File),
+            _ => Some(Self::Files(paths)),
+        }
+    }
+
+    /// The files.
+    pub fn paths(&self) -> &[PathBuf] {
+        match self {
+            Self::File(path) => std::slice::from_ref(path),
+            Self::Files(paths) => paths,
+            Self::Sample => &[],
+        }
+    }
+
+    /// The file's name without folders, and how many more there are.
     pub fn name(&self) -> String {
         match self {
+            Self::Files(paths) => {
+                let first = paths
+                    .first()
+                    .map(|path| Self::File(path.clone()).name())
+                    .unwrap_or_default();
+                format!("{first} + {} more", paths.len().saturating_sub(1))
+            }
             Self::File(path) => path
                 .file_name()
                 .unwrap_or(path.as_os_str())
@@ -48,9 +75,27 @@ impl ScanOrigin {
     fn display(&self) -> String {
         match self {
             Self::File(path) => path.display().to_string(),
+            // Which of them it is, the error says.
+            Self::Files(_) => String::new(),
             Self::Sample => SAMPLE_NAME.to_owned(),
         }
     }
+}
+
+/// Reads files as layers of one scan, each with its options.
+fn read_files(paths: &[PathBuf], options: &[ReadOptions], progress: &dyn Progress) -> Result<Scan, ReadError> {
+    let mut scans = Vec::with_capacity(paths.len());
+    for (index, path) in paths.iter().enumerate() {
+        let share = |index: usize| index as f32 / paths.len() as f32;
+        let part = Part::new(progress, share(index)..share(index + 1));
+        let options = options.get(index).cloned().unwrap_or_default();
+        scans.push(match normend_io::read_with(path, &options, &part) {
+            // The text has other columns than when the user named them.
+            Err(ReadError::Broken { .. }) if options != ReadOptions::default() => normend_io::read(path, &part)?,
+            result => result?,
+        });
+    }
+    Scan::together(scans, &Part::new(progress, 1.0..1.0))
 }
 
 /// `reason` without the file that it begins with, which the message around it names shortly.
@@ -127,20 +172,22 @@ impl Work {
     pub fn open(
         ctx: &egui::Context,
         origin: ScanOrigin,
+        options: Vec<ReadOptions>,
         journals: Option<JournalFolder>,
         uploader: Option<CloudUploader>,
     ) -> Self {
         let source = origin.clone();
         let job = Job::start(ctx, "open", "Reading", move |progress| {
             let scan = match &source {
-                ScanOrigin::File(path) => normend_io::read(path, progress),
                 ScanOrigin::Sample => normend_io::read_bytes(SAMPLE.to_vec(), SAMPLE_NAME, progress),
+                files => read_files(files.paths(), &options, progress),
             };
             let scan = scan.map_err(|error| match error {
                 ReadError::Cancelled(_) => JobError::Cancelled,
                 error => JobError::Failed(without_file(&error.to_string(), &source.display())),
             })?;
-            let places = ScannerPlaces::read(&scan, ScannerFiles::default(), progress).map_err(|_| JobError::Cancelled)?;
+            let places =
+                ScannerPlaces::read(&scan, ScannerFiles::default(), progress).map_err(|_| JobError::Cancelled)?;
             progress.stage("Preparing the picture");
             let cloud = uploader.and_then(|uploader| upload_points(&uploader, &scan.cloud).ok());
             // Hashes the file, and the editor needs that with its first edit.
@@ -148,11 +195,7 @@ impl Work {
             let findings = journals.map_or_else(Findings::default, |folder| {
                 journal::found::find(&folder.path, &identity, folder.patience)
             });
-            let opened = Opened {
-                scan,
-                places,
-                findings,
-            };
+            let opened = Opened { scan, places, findings };
             Ok(Uploaded { result: opened, cloud })
         });
         Self::Open { job, origin }
@@ -199,12 +242,14 @@ impl Work {
         let orientation = session.document.orientation()?.clone();
         let propagation = session.document.shared_propagation()?;
         let scan = Arc::clone(&session.scan);
-        let options = WriteOptions {
-            rule: session.rule()?,
-            overwrite_input: order.overwrite_input,
-            overwrite_changed: order.overwrite_changed,
+        let targets = order.targets(&session.rule()?);
+        let with_confidence = order.with_confidence;
+        // The message around the reason names a file that is written alone.
+        let named = if targets.len() == 1 {
+            order.path.display().to_string()
+        } else {
+            String::new()
         };
-        let (target, with_confidence) = (order.path.clone(), order.with_confidence);
         let job = Job::start(ctx, "export", "Writing", move |progress| {
             let normals = propagation.oriented_normals(&orientation);
             let confidence = if with_confidence {
@@ -212,10 +257,11 @@ impl Work {
             } else {
                 None
             };
-            scan.write_with_confidence(&normals, confidence.as_deref(), &target, &options, progress)
-                .map_err(|error| match error {
-                    WriteError::Cancelled(_) => JobError::Cancelled,
-                    error => JobError::Failed(about_target(&error.to_string(), &target.display().to_string())),
+            scan.write_layers(&normals, confidence.as_deref(), &targets, progress)
+                .map_err(|error| match &error.reason {
+                    WriteError::Cancelled(_) if error.written.is_empty() => JobError::Cancelled,
+                    _ if named.is_empty() => JobError::Failed(error.to_string()),
+                    _ => JobError::Failed(about_target(&error.to_string(), &named)),
                 })
         });
         Some(Self::Export {
@@ -232,9 +278,7 @@ impl Work {
             Self::Propagate { .. } => "Orienting normals".to_owned(),
             Self::Pictures { .. } => "Drawing pictures".to_owned(),
             Self::Export { order, .. } => {
-                let path = &order.path;
-                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-                format!("Exporting {}", theme::elided(&name, MAX_NAME))
+                format!("Exporting {}", theme::elided(&order.words(), MAX_NAME))
             }
         }
     }

@@ -131,10 +131,14 @@ impl PointCloud {
         let origin = Self::origin_for(min, max)?;
         // The corners of what is stored, which the unit of remainders goes by, before the first remainder is taken.
         let stored = |cloud: &Self, point: usize| (cloud.relative(point) + (cloud.origin - origin)).as_vec3();
-        let (min, max) = clouds.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |corners, cloud| {
-            let positions = (0..cloud.n_points()).into_par_iter().map(|point| stored(cloud, point));
-            positions.map(|position| (position, position)).reduce(|| corners, |a, b| (a.0.min(b.0), a.1.max(b.1)))
-        });
+        let (min, max) = clouds
+            .iter()
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |corners, cloud| {
+                let positions = (0..cloud.n_points()).into_par_iter().map(|point| stored(cloud, point));
+                positions
+                    .map(|position| (position, position))
+                    .reduce(|| corners, |a, b| (a.0.min(b.0), a.1.max(b.1)))
+            });
         let mut joined = Self {
             origin,
             positions: Vec::with_capacity(n_points),
@@ -144,11 +148,14 @@ impl PointCloud {
         };
         for cloud in clouds {
             let points = 0..cloud.n_points();
-            joined.positions.par_extend(points.clone().into_par_iter().map(|point| stored(&cloud, point)));
+            joined
+                .positions
+                .par_extend(points.clone().into_par_iter().map(|point| stored(&cloud, point)));
             let mut remainders = std::mem::take(&mut joined.remainders);
             let first = remainders.len();
             remainders.par_extend(points.into_par_iter().map(|point| {
-                let lacks = cloud.relative(point) + (cloud.origin - origin) - joined.positions[first + point].as_dvec3();
+                let lacks =
+                    cloud.relative(point) + (cloud.origin - origin) - joined.positions[first + point].as_dvec3();
                 joined.in_remainder_steps(lacks)
             }));
             joined.remainders = remainders;

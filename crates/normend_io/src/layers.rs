@@ -7,18 +7,48 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use normend_core::evidence::Station;
+use normend_core::progress::Part;
 use normend_core::{PointCloud, Progress};
 
 use crate::error::{Broken, ReadError, WriteError};
 use crate::format::FileFormat;
 use crate::new_file::Loss;
 use crate::recipe::ScanIdentity;
+use crate::save::is_same_file;
 use crate::scan::{Layer, Scan, hash};
 use crate::write::WriteOptions;
 use crate::xyz::TextColumns;
 
 /// The color of points whose file has none where another has: a gray that is neither shade nor light.
 const NO_COLOR: [u8; 3] = [160; 3];
+
+/// Where one file of a scan goes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LayerTarget {
+    /// The file to write.
+    pub path: PathBuf,
+    /// What it replaces, and the rule.
+    pub options: WriteOptions,
+}
+
+/// Why not all files of a scan were written. Those that were are whole, the others as they were.
+#[derive(Debug, thiserror::Error)]
+#[error("{reason}{}", written_words(written))]
+pub struct NotAllWritten {
+    /// What went wrong.
+    #[source]
+    pub reason: WriteError,
+    /// The files that were written before that, in order.
+    pub written: Vec<PathBuf>,
+}
+
+fn written_words(written: &[PathBuf]) -> String {
+    if written.is_empty() {
+        return String::new();
+    }
+    let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
+    format!("; written before that: {}", names.join(", "))
+}
 
 impl Scan {
     /// One scan of several: a cloud of all points around a common origin, file after file, each file kept to be written again by
@@ -248,6 +278,76 @@ impl Scan {
         }
     }
 
+    /// What it is called: the first file's name, and how many more there are.
+    pub fn name(&self) -> String {
+        let first = self.layers.first().map_or("", |layer| layer.name.as_str());
+        match self.layers.len() {
+            ..=1 => first.to_owned(),
+            n => format!("{first} + {} more", n - 1),
+        }
+    }
+
+    /// Writes each file with its part of `normals` and `confidence` (by point of the scan) to its own target, in order, each as
+    /// [`Layer::write_with_confidence`] does. Nothing is written when a target cannot be right: one of another file of this scan, one
+    /// that two would go to, an extension of another format.
+    ///
+    /// # Errors
+    /// [`NotAllWritten`], which says what was written before.
+    pub fn write_layers(
+        &self,
+        normals: &[Vec3],
+        confidence: Option<&[u8]>,
+        targets: &[LayerTarget],
+        progress: &dyn Progress,
+    ) -> Result<(), NotAllWritten> {
+        let mut written = Vec::new();
+        let outcome = self.check_targets(normals.len(), targets).and_then(|()| {
+            for (layer, target) in self.layers.iter().zip(targets) {
+                let points = layer.points.start as usize..layer.points.end as usize;
+                let share = |point: usize| point as f32 / self.cloud.n_points().max(1) as f32;
+                let part = Part::new(progress, share(points.start)..share(points.end));
+                let confidence = confidence.and_then(|confidence| confidence.get(points.clone()));
+                layer.write_with_confidence(&normals[points], confidence, &target.path, &target.options, &part)?;
+                written.push(target.path.clone());
+            }
+            Ok(())
+        });
+        outcome.map_err(|reason| NotAllWritten { reason, written })
+    }
+
+    /// Refuses, before anything is written, what cannot be right.
+    fn check_targets(&self, n_normals: usize, targets: &[LayerTarget]) -> Result<(), WriteError> {
+        if targets.len() != self.layers.len() {
+            return Err(WriteError::SeveralFiles {
+                n_files: self.layers.len(),
+            });
+        }
+        if n_normals != self.cloud.n_points() {
+            return Err(WriteError::Count {
+                n_normals,
+                n_points: self.cloud.n_points(),
+            });
+        }
+        for (index, (layer, target)) in self.layers.iter().zip(targets).enumerate() {
+            let path = &target.path;
+            FileFormat::of_target(path, layer.path().map(PathBuf::as_path))?;
+            let refuse = |reason| {
+                let path = path.clone();
+                Err(WriteError::Target { path, reason })
+            };
+            let others = self.layers.iter().enumerate().filter(|(other, _)| *other != index);
+            let mut others = others.filter_map(|(_, layer)| layer.path());
+            if others.any(|other| is_same_file(other, path)) {
+                return refuse("is another file of this scan: name another target");
+            }
+            let mut before = targets[..index].iter();
+            if before.any(|before| before.path == *path || is_same_file(&before.path, path)) {
+                return refuse("would be written twice: give each file a target of its own");
+            }
+        }
+        Ok(())
+    }
+
     /// [`Layer::write`] of a scan of one file.
     ///
     /// # Errors
@@ -385,6 +485,26 @@ mod tests {
             let expect = if layer.name == "a.xyz" { Vec3::X } else { Vec3::Y };
             assert_eq!(again.given_normals.unwrap()[..], [expect; 4]);
         }
+        let target = |name: &str| LayerTarget {
+            path: folder.path().join(name),
+            options: WriteOptions::default(),
+        };
+        let write = |targets: &[LayerTarget]| scan.write_layers(&normals, None, targets, &Silent);
+        write(&[target("1.xyz"), target("2.ply")]).unwrap();
+        assert_eq!(
+            read(&target("2.ply").path, &Silent).unwrap().given_normals.unwrap()[..],
+            [Vec3::Y; 4]
+        );
+        let error = write(&[target("3.xyz"), target("3.xyz")]).unwrap_err();
+        assert!(
+            error.written.is_empty() && error.to_string().contains("written twice"),
+            "{error}"
+        );
+        let error = write(&[target("3.xyz"), target("none/4.xyz")]).unwrap_err();
+        assert_eq!(error.written, [target("3.xyz").path]);
+        assert!(error.to_string().contains("written before that: "), "{error}");
+        assert!(write(&[target("5.xyz")]).is_err() && !target("5.xyz").path.exists());
+
         let path = folder.path().join("c.xyz");
         let error = scan
             .write(&normals, &path, &WriteOptions::default(), &Silent)

@@ -65,6 +65,7 @@ mod confidence_tests;
 
 pub use error::{Broken, Place, ReadError, WriteError, io_words};
 pub use format::FileFormat;
+pub use layers::{LayerTarget, NotAllWritten};
 pub use new_file::Loss;
 pub use save::{is_same_file, n_other_names};
 pub use scan::{Layer, ReadOptions, Scan, read, read_bytes, read_bytes_with, read_with};

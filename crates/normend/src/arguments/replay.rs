@@ -19,24 +19,27 @@ The recipe must be of IN's very content. Where IN holds the same points in the s
 oriented anew around it. Places of the scanner that the editor found with the scan are found again, those that were typed are in the \
 recipe.
 
-The report (--json) has one line, an object with recipe, input, output, points, left_out (rows without finite coordinates), edits, \
+A recipe of several files takes these in its order, and each is written to its own file in the folder OUT.
+
+The report (--json) has a line for each file, an object with recipe, input, output, points, left_out (rows without finite coordinates), edits, \
 sources, marks (points set for themselves), pinned, same_content, rule (what decided the sides, in words), parameters, seconds \
 (read, orient, write, total) and peak_rss_bytes (null where the system does not tell). A failed replay has recipe, input and error.
 
 Examples:
   normend replay church.normend church.ply -o church_oriented.ply
   normend replay church.normend church.ply -o church_tree.ply --preset tree --k-graph 8
+  normend replay abbey.normend nave.laz tower.e57 -o oriented/
   normend replay church.normend church_colored.ply -o out.ply --same-points --json - | jq .edits")]
 pub struct ReplayArguments {
     /// Recipe that the editor saved
     #[arg(value_name = "RECIPE")]
     pub recipe: PathBuf,
 
-    /// Scan that it was made for: PLY, or XYZ text
-    #[arg(value_name = "IN")]
-    pub input: PathBuf,
+    /// Scan that it was made for; of several files, all of them in the order of the recipe
+    #[arg(value_name = "IN", required = true)]
+    pub inputs: Vec<PathBuf>,
 
-    /// File to write
+    /// File to write, or a folder for files of the same names
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
 
@@ -77,6 +80,6 @@ pub struct RehearseArguments {
     pub recipe: PathBuf,
 
     /// Scan that it was made for
-    #[arg(value_name = "IN")]
-    pub input: PathBuf,
+    #[arg(value_name = "IN", required = true)]
+    pub inputs: Vec<PathBuf>,
 }

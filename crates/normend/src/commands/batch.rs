@@ -119,6 +119,17 @@ impl Plan {
         })
     }
 
+    /// Makes the folder that the outputs go to, if there is one.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn make_folder(&self) -> anyhow::Result<()> {
+        if let Some(folder) = &self.folder {
+            fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        }
+        Ok(())
+    }
+
     /// Does `work` for each file; one that fails is said and reported, and does not stop the rest. A line of the report is there
     /// the moment its file is done.
     ///
@@ -130,36 +141,63 @@ impl Plan {
         quiet: bool,
         mut work: impl FnMut(&Job, &Bar) -> anyhow::Result<T>,
     ) -> anyhow::Result<Outcome> {
+        let one_by_one: Vec<&[Job]> = self.jobs.chunks(1).collect();
+        self.run_groups(typed, &one_by_one, quiet, |jobs, bar| {
+            jobs.iter().map(|job| work(job, bar)).collect()
+        })
+    }
+
+    /// Does `work` for each group of files, which gives a line of the report for each file. Where it fails, all files of the group have
+    /// failed, and the next group goes on.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn run_groups<T: Serialize>(
+        &self,
+        typed: Typed<'_>,
+        groups: &[&[Job]],
+        quiet: bool,
+        mut work: impl FnMut(&[Job], &Bar) -> anyhow::Result<Vec<T>>,
+    ) -> anyhow::Result<Outcome> {
         let mut report = typed.json.map(|path| open_report(path, typed.overwrite)).transpose()?;
-        if let Some(folder) = &self.folder {
-            fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        }
+        self.make_folder()?;
         let mut outcome = Outcome::Done;
-        for job in &self.jobs {
-            let bar = Bar::new(&title_of(&job.input), quiet);
-            let line = match work(job, &bar) {
-                Ok(done) => serde_json::to_vec(&done),
+        for &jobs in groups {
+            let bar = Bar::new(&title_of_all(jobs), quiet);
+            let lines: Result<Vec<Vec<u8>>, serde_json::Error> = match work(jobs, &bar) {
+                Ok(done) => done.iter().map(serde_json::to_vec).collect(),
                 Err(error) if console::is_stopped() => return Err(error),
                 Err(error) => {
                     outcome = Outcome::Failed;
                     let error = console::in_words(&error);
                     bar.say_error(&format!("error: {error}"));
-                    serde_json::to_vec(&Failure {
-                        input: &job.input,
-                        error,
-                    })
+                    let failure = |job: &Job| {
+                        serde_json::to_vec(&Failure {
+                            input: &job.input,
+                            error: error.clone(),
+                        })
+                    };
+                    jobs.iter().map(failure).collect()
                 }
             };
             if let Some(report) = &mut report {
-                let mut line = line.context("cannot put the report into JSON")?;
-                line.push(b'\n');
-                report
-                    .write_all(&line)
-                    .and_then(|()| report.flush())
-                    .context("cannot write the report")?;
+                for mut line in lines.context("cannot put the report into JSON")? {
+                    line.push(b'\n');
+                    report.write_all(&line).context("cannot write the report")?;
+                }
+                report.flush().context("cannot write the report")?;
             }
         }
         Ok(outcome)
+    }
+}
+
+/// What files are called that are worked on at once.
+pub fn title_of_all(jobs: &[Job]) -> String {
+    let first = jobs.first().map(|job| title_of(&job.input)).unwrap_or_default();
+    match jobs.len() {
+        ..=1 => first,
+        n => format!("{first} + {} more", n - 1),
     }
 }
 

@@ -76,7 +76,14 @@ fn convert(job: &Job, arguments: &ConvertArguments, bar: &Bar) -> anyhow::Result
 /// # Errors
 /// A format that is not written; with `strict` anything that would be lost.
 pub(super) fn refuse_or_say_losses(scan: &Scan, job: &Job, strict: bool, bar: &Bar) -> anyhow::Result<Vec<Loss>> {
-    let losses = scan.losses(&job.output)?;
+    say_losses(scan.losses(&job.output)?, job, strict, bar)
+}
+
+/// As [`refuse_or_say_losses`], of what is known already.
+///
+/// # Errors
+/// With `strict` anything that would be lost.
+pub(super) fn say_losses(losses: Vec<Loss>, job: &Job, strict: bool, bar: &Bar) -> anyhow::Result<Vec<Loss>> {
     if losses.is_empty() {
         return Ok(losses);
     }

@@ -1,6 +1,6 @@
 //! `normend orient`: scans in, the same scans with oriented normals out.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use normend_core::confidence::{confidence, n_undecided};
@@ -8,18 +8,18 @@ use normend_core::evidence::Known;
 use normend_core::progress::Part;
 use normend_core::{Document, EditError, Method, Parameters, Progress, Propagation, SideRule, SourceRule, Start};
 use normend_io::recipe::NamedParameters;
-use normend_io::{Loss, WriteOptions};
+use normend_io::{Layer, LayerTarget, Loss, Scan, WriteOptions};
 use serde::{Serialize, Serializer};
 
 use super::batch::{Job, Plan, Typed};
-use super::convert::refuse_or_say_losses;
+use super::convert::say_losses;
 use super::{Outcome, check_may_write, prepare, say_other_names, scanner, wrong_use};
 use crate::arguments::OrientArguments;
 use crate::console::{self, Bar, counted};
 use crate::memory::peak_rss_bytes;
 
 /// What is reported of an input that was oriented.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 struct Oriented {
     input: PathBuf,
     output: PathBuf,
@@ -46,7 +46,7 @@ struct Oriented {
 }
 
 /// Wall seconds by stage, in the order of work.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Seconds(Vec<(&'static str, f64)>);
 
 impl Serialize for Seconds {
@@ -81,11 +81,17 @@ pub fn run(arguments: OrientArguments) -> anyhow::Result<Outcome> {
     {
         console::say(&format!("the preset is tree, as {flag} is not for auto"));
     }
-    plan.run(typed, arguments.common.quiet, |job, bar| {
-        let oriented = orient(job, parameters, &arguments, bar)?;
-        bar.say(&sentence(&oriented));
+    let work = |jobs: &[Job], bar: &Bar| {
+        let oriented = orient(jobs, parameters, &arguments, bar)?;
+        oriented.iter().for_each(|oriented| bar.say(&sentence(oriented)));
         Ok(oriented)
-    })
+    };
+    let groups = if arguments.together {
+        vec![&plan.jobs[..]]
+    } else {
+        plan.jobs.chunks(1).collect()
+    };
+    plan.run_groups(typed, &groups, arguments.common.quiet, work)
 }
 
 /// The parameters that were typed; who says where the scanner stood wants its side.
@@ -122,41 +128,58 @@ fn check(arguments: &OrientArguments) -> anyhow::Result<()> {
             "--confidence is known for the automatic method only: leave out the flags of other methods and --start keep",
         ));
     }
-    if arguments.scanner.sensors.is_some() && arguments.inputs.len() > 1 {
+    if arguments.scanner.sensors.is_some() && arguments.inputs.len() > 1 && !arguments.together {
         return Err(wrong_use(
-            "the table of --sensors belongs to one scan: orient the scans one by one",
+            "the table of --sensors belongs to one scan: orient the scans one by one, or --together",
         ));
     }
+    // One drive is often cut into several files, so a trajectory may be that of all inputs.
     Ok(())
 }
 
-/// Reads, orients and writes one scan.
-fn orient(job: &Job, parameters: Parameters, arguments: &OrientArguments, bar: &Bar) -> anyhow::Result<Oriented> {
-    check_may_write(&job.output, arguments.overwrite)?;
+/// Reads, orients and writes one file, or several as one cloud.
+fn orient(
+    jobs: &[Job],
+    parameters: Parameters,
+    arguments: &OrientArguments,
+    bar: &Bar,
+) -> anyhow::Result<Vec<Oriented>> {
+    for job in jobs {
+        check_may_write(&job.output, arguments.overwrite)?;
+    }
     let started = Instant::now();
     let mut seconds = Seconds::default();
 
-    let scan = super::read(&job.input, &arguments.reading, bar, &Part::new(bar, 0.0..0.1))?;
+    let mut scans = Vec::with_capacity(jobs.len());
+    for (index, job) in jobs.iter().enumerate() {
+        let share = |index: usize| 0.1 * index as f32 / jobs.len() as f32;
+        let part = Part::new(bar, share(index)..share(index + 1));
+        scans.push(super::read(&job.input, &arguments.reading, bar, &part)?);
+    }
+    let scan = Scan::together(scans, &Part::new(bar, 0.1..0.1))?;
     seconds.0.push(("read", started.elapsed().as_secs_f64()));
-    let points = scan.cloud.n_points();
-    let losses = refuse_or_say_losses(&scan, job, arguments.strict, bar)?;
+    let mut losses = Vec::with_capacity(jobs.len());
+    for (layer, job) in scan.layers().iter().zip(jobs) {
+        losses.push(say_losses(layer.losses(&job.output)?, job, arguments.strict, bar)?);
+    }
+    let name = jobs
+        .iter()
+        .map(|job| job.input.display().to_string())
+        .collect::<Vec<_>>()
+        .join(", ");
     if parameters.start == Start::Keep && scan.given_normals.is_none() {
-        bar.say(&format!(
-            "{} has no normals to keep: they are estimated",
-            job.input.display()
-        ));
+        bar.say(&format!("{name} has no normals to keep: they are estimated"));
     }
 
     if parameters.rule == SideRule::Given && scan.given_normals.is_none() {
         bar.say(&format!(
-            "{} has no normals to follow: the side that is seen from outside counts",
-            job.input.display()
+            "{name} has no normals to follow: the side that is seen from outside counts"
         ));
     }
 
     let rule = arguments.propagation.rule;
     let part = Part::new(bar, 0.1..0.12);
-    let places = scanner::places(&arguments.scanner, rule, &scan, &job.input, bar, &part)?;
+    let places = scanner::places(&arguments.scanner, rule, &scan, Path::new(&name), bar, &part)?;
     let known = Known {
         given: scan.given_normals.as_ref().map(|normals| normals.as_slice()),
         stations: &places.stations,
@@ -183,37 +206,43 @@ fn orient(job: &Job, parameters: Parameters, arguments: &OrientArguments, bar: &
     seconds.0.push(("signs", signs_started.elapsed().as_secs_f64()));
 
     let write_started = Instant::now();
-    let options = WriteOptions {
-        rule: rule.to_owned(),
-        overwrite_input: arguments.overwrite,
-        ..WriteOptions::default()
+    let target = |job: &Job| LayerTarget {
+        path: job.output.clone(),
+        options: WriteOptions {
+            rule: rule.to_owned(),
+            overwrite_input: arguments.overwrite,
+            ..WriteOptions::default()
+        },
     };
+    let targets: Vec<LayerTarget> = jobs.iter().map(target).collect();
     let writing = Part::new(bar, 0.9..1.0);
     writing.report(0.0)?;
-    say_other_names(&job.output, bar);
+    jobs.iter().for_each(|job| say_other_names(&job.output, bar));
     let written = sureness.as_deref().filter(|_| arguments.confidence);
-    scan.write_with_confidence(&normals, written, &job.output, &options, &writing)?;
+    scan.write_layers(&normals, written, &targets, &writing)?;
     seconds.0.push(("write", write_started.elapsed().as_secs_f64()));
     seconds.0.push(("total", started.elapsed().as_secs_f64()));
 
-    Ok(Oriented {
+    let oriented = |((job, layer), losses): ((&Job, &Layer), &Vec<Loss>)| Oriented {
         input: job.input.clone(),
         output: job.output.clone(),
-        points,
-        left_out: scan.n_left_out,
+        points: layer.n_points(),
+        left_out: layer.n_left_out,
         components,
         sources,
         voted_sources,
         without_evidence,
-        undecided: sureness.as_deref().map(n_undecided),
+        undecided: (sureness.as_deref())
+            .map(|sureness| n_undecided(&sureness[layer.points.start as usize..layer.points.end as usize])),
         rule,
         lost: losses.iter().map(Loss::to_string).collect(),
         found_station,
         scanner: places.words(),
         parameters,
-        seconds,
+        seconds: seconds.clone(),
         peak_rss_bytes: peak_rss_bytes(),
-    })
+    };
+    Ok(jobs.iter().zip(scan.layers()).zip(&losses).map(oriented).collect())
 }
 
 /// One line for a person: what came out, and where it is.

@@ -11,13 +11,13 @@ use normend_core::confidence::confidence;
 use normend_core::evidence::{Known, Station};
 use normend_core::progress::Part;
 use normend_core::{EditError, Parameters, Progress, Propagation, SideRule, Silent};
-use normend_io::recipe::{self, End, Event, Recipe};
-use normend_io::{ReadOptions, Scan, ScannerFiles, ScannerPlaces, WriteOptions, is_same_file};
+use normend_io::recipe::{self, End, Event, Recipe, ScanIdentity};
+use normend_io::{Layer, LayerTarget, ReadOptions, Scan, ScannerFiles, ScannerPlaces, WriteOptions, is_same_file};
 use serde::Serialize;
 
-use super::batch::open_report;
+use super::batch::{Job, Plan, Typed, open_report, title_of_all};
 use super::orient::serialize_parameters;
-use super::{Outcome, check_may_write, check_scan_name, prepare, say_other_names, scanner, title_of, wrong_use};
+use super::{Outcome, check_may_write, prepare, say_other_names, scanner, wrong_use};
 use crate::arguments::replay::{RehearseArguments, ReplayArguments};
 use crate::console::{self, Bar, counted};
 use crate::memory::peak_rss_bytes;
@@ -35,7 +35,7 @@ enum Report<'a> {
 }
 
 /// What is reported of a recipe that was replayed.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 struct Replayed {
     recipe: PathBuf,
     input: PathBuf,
@@ -56,7 +56,7 @@ struct Replayed {
 }
 
 /// Wall seconds.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize)]
 struct Seconds {
     read: f64,
     orient: f64,
@@ -69,84 +69,109 @@ struct Seconds {
 /// # Errors
 /// Wrong use, a report that cannot be written, Ctrl-C. What is wrong with the recipe or the scan is said and reported instead.
 pub fn run(arguments: &ReplayArguments) -> anyhow::Result<Outcome> {
-    check(arguments)?;
+    let plan = plan(arguments)?;
     prepare(&arguments.common)?;
     let json = arguments.json.as_deref();
     let mut report = json.map(|path| open_report(path, arguments.overwrite)).transpose()?;
-    let bar = Bar::new(&title_of(&arguments.input), arguments.common.quiet);
-    let (outcome, line) = match replay(arguments, &bar) {
+    plan.make_folder()?;
+    let jobs = &plan.jobs[..];
+    let bar = Bar::new(&title_of_all(jobs), arguments.common.quiet);
+    let (outcome, lines) = match replay(arguments, jobs, &bar) {
         Ok(replayed) => {
-            bar.say(&format!(
-                "{}: {} of {} on {}, {:.1} s → {}",
-                arguments.input.display(),
-                counted(replayed.edits, "edit"),
-                arguments.recipe.display(),
-                counted(replayed.points, "point"),
-                replayed.seconds.total,
-                arguments.output.display()
-            ));
-            (Outcome::Done, Report::Done(Box::new(replayed)))
+            for replayed in &replayed {
+                bar.say(&format!(
+                    "{}: {} of {} on {}, {:.1} s → {}",
+                    replayed.input.display(),
+                    counted(replayed.edits, "edit"),
+                    arguments.recipe.display(),
+                    counted(replayed.points, "point"),
+                    replayed.seconds.total,
+                    replayed.output.display()
+                ));
+            }
+            let lines = replayed.into_iter().map(|replayed| Report::Done(Box::new(replayed)));
+            (Outcome::Done, lines.collect::<Vec<Report<'_>>>())
         }
         Err(error) if console::is_stopped() => return Err(error),
         Err(error) => {
             let error = console::in_words(&error);
             bar.say_error(&format!("error: {error}"));
-            let (recipe, input) = (&*arguments.recipe, &*arguments.input);
-            (Outcome::Failed, Report::Failed { recipe, input, error })
+            let lines = jobs.iter().map(|job| Report::Failed {
+                recipe: &arguments.recipe,
+                input: &job.input,
+                error: error.clone(),
+            });
+            (Outcome::Failed, lines.collect())
         }
     };
     if let Some(report) = &mut report {
-        let mut line = serde_json::to_vec(&line).context("cannot put the report into JSON")?;
-        line.push(b'\n');
-        report
-            .write_all(&line)
-            .and_then(|()| report.flush())
-            .context("cannot write the report")?;
+        for line in &lines {
+            let mut line = serde_json::to_vec(line).context("cannot put the report into JSON")?;
+            line.push(b'\n');
+            report.write_all(&line).context("cannot write the report")?;
+        }
+        report.flush().context("cannot write the report")?;
     }
     Ok(outcome)
 }
 
-/// Refuses, before the work, what would lose a file.
-fn check(arguments: &ReplayArguments) -> anyhow::Result<()> {
-    let (recipe, input, output) = (&arguments.recipe, &arguments.input, &arguments.output);
-    check_scan_name(output, Some(input))?;
+/// Where each file goes, with everything refused before the work that would lose a file.
+fn plan(arguments: &ReplayArguments) -> anyhow::Result<Plan> {
     scanner::check(&arguments.scanner, arguments.propagation.rule)?;
-    if is_same_file(recipe, output) || recipe == output {
+    let recipe = &arguments.recipe;
+    let json = arguments.json.as_deref();
+    let plan = Plan::new(Typed {
+        inputs: &arguments.inputs,
+        output: &arguments.output,
+        extension: None,
+        overwrite: arguments.overwrite,
+        json,
+    })?;
+    let is_recipe = |job: &Job| is_same_file(recipe, &job.output) || *recipe == job.output;
+    if plan.jobs.iter().any(is_recipe) {
         return Err(wrong_use("the output would take the place of the recipe: name another"));
     }
-    if !arguments.overwrite && is_same_file(input, output) {
-        return Err(wrong_use(format!(
-            "{} is the input: name another output, or allow it with --overwrite",
-            output.display()
-        )));
-    }
-    let is_taken = |report: &Path| {
-        report == output || is_same_file(report, input) || is_same_file(report, recipe) || is_same_file(report, output)
-    };
-    if arguments.json.as_deref().is_some_and(is_taken) {
+    let is_taken =
+        |report: &Path| is_same_file(report, recipe) || plan.jobs.iter().any(|job| is_same_file(report, &job.output));
+    if json.is_some_and(is_taken) {
         return Err(wrong_use(
             "the report of --json would take the place of another file: give it another name",
         ));
     }
-    Ok(())
+    Ok(plan)
+}
+
+/// Reads the files of a scan as its recipe has read them.
+fn read_scan(inputs: &[PathBuf], of: &ScanIdentity, progress: &dyn Progress) -> anyhow::Result<Scan> {
+    let mut scans = Vec::with_capacity(inputs.len());
+    for (index, input) in inputs.iter().enumerate() {
+        let share = |index: usize| index as f32 / inputs.len() as f32;
+        let part = Part::new(progress, share(index)..share(index + 1));
+        let file = of.files.get(index).unwrap_or(of);
+        let reading = ReadOptions {
+            columns: file.columns.clone(),
+        };
+        scans.push(normend_io::read_with(input, &reading, &part)?);
+    }
+    Ok(Scan::together(scans, progress)?)
 }
 
 /// Reads, decides and orients as the recipe says, and writes.
-fn replay(arguments: &ReplayArguments, bar: &Bar) -> anyhow::Result<Replayed> {
-    check_may_write(&arguments.output, arguments.overwrite)?;
+fn replay(arguments: &ReplayArguments, jobs: &[Job], bar: &Bar) -> anyhow::Result<Vec<Replayed>> {
+    for job in jobs {
+        check_may_write(&job.output, arguments.overwrite)?;
+    }
     let started = Instant::now();
     let recipe = read_recipe(&arguments.recipe, bar)?;
-    let reading = ReadOptions {
-        columns: recipe.head.scan.columns.clone(),
-    };
-    let scan = normend_io::read_with(&arguments.input, &reading, &Part::new(bar, 0.0..0.1))?;
+    let scan = read_scan(&arguments.inputs, &recipe.head.scan, &Part::new(bar, 0.0..0.1))?;
     let read = started.elapsed().as_secs_f64();
     let same_content = check_scan(&recipe, &scan, arguments)?;
 
     let orient_started = Instant::now();
-    let left_out = scan.n_left_out;
-    let places = scanner::places(&arguments.scanner, None, &scan, &arguments.input, bar, &Part::new(bar, 0.1..0.12))?;
-    let mut session = Session::new(scan, title_of(&arguments.input));
+    let input = PathBuf::from(inputs_in_words(&arguments.inputs));
+    let places = scanner::places(&arguments.scanner, None, &scan, &input, bar, &Part::new(bar, 0.1..0.12))?;
+    let name = scan.name();
+    let mut session = Session::new(scan, name);
     session.scanner.places = places;
     session.begin_with(recipe.head.parameters);
     session.take_recipe(&recipe)?;
@@ -171,40 +196,52 @@ fn replay(arguments: &ReplayArguments, bar: &Bar) -> anyhow::Result<Replayed> {
     let orient = orient_started.elapsed().as_secs_f64();
 
     let write_started = Instant::now();
-    let options = WriteOptions {
-        rule: rule.clone(),
-        overwrite_input: arguments.overwrite,
-        ..WriteOptions::default()
+    let target = |job: &Job| LayerTarget {
+        path: job.output.clone(),
+        options: WriteOptions {
+            rule: rule.clone(),
+            overwrite_input: arguments.overwrite,
+            ..WriteOptions::default()
+        },
     };
+    let targets: Vec<LayerTarget> = jobs.iter().map(target).collect();
     let writing = Part::new(bar, 0.9..1.0);
     writing.report(0.0)?;
-    say_other_names(&arguments.output, bar);
+    jobs.iter().for_each(|job| say_other_names(&job.output, bar));
     session
         .scan
-        .write_with_confidence(&normals, sureness.as_deref(), &arguments.output, &options, &writing)?;
+        .write_layers(&normals, sureness.as_deref(), &targets, &writing)?;
 
     let document = &session.document;
-    Ok(Replayed {
+    let seconds = Seconds {
+        read,
+        orient,
+        write: write_started.elapsed().as_secs_f64(),
+        total: started.elapsed().as_secs_f64(),
+    };
+    let replayed = |(job, layer): (&Job, &Layer)| Replayed {
         recipe: arguments.recipe.clone(),
-        input: arguments.input.clone(),
-        output: arguments.output.clone(),
-        points: document.cloud().n_points(),
-        left_out,
+        input: job.input.clone(),
+        output: job.output.clone(),
+        points: layer.n_points(),
+        left_out: layer.n_left_out,
         edits: recipe.history().1,
         sources: document.sources().len(),
         marks: document.marks().len(),
         pinned: document.marks().n_pinned(),
         same_content,
-        rule,
+        rule: rule.clone(),
         parameters,
-        seconds: Seconds {
-            read,
-            orient,
-            write: write_started.elapsed().as_secs_f64(),
-            total: started.elapsed().as_secs_f64(),
-        },
+        seconds,
         peak_rss_bytes: peak_rss_bytes(),
-    })
+    };
+    Ok(jobs.iter().zip(session.scan.layers()).map(replayed).collect())
+}
+
+/// The files of a scan, for messages.
+fn inputs_in_words(inputs: &[PathBuf]) -> String {
+    let names: Vec<String> = inputs.iter().map(|input| input.display().to_string()).collect();
+    names.join(", ")
 }
 
 fn read_recipe(path: &Path, bar: &Bar) -> anyhow::Result<Recipe> {
@@ -222,24 +259,23 @@ fn read_recipe(path: &Path, bar: &Bar) -> anyhow::Result<Recipe> {
 
 /// Whether the scan is the recipe's very file; refuses other ones, unless they are said to have the same points.
 fn check_scan(recipe: &Recipe, scan: &Scan, arguments: &ReplayArguments) -> anyhow::Result<bool> {
-    let (of, here) = (&recipe.head.scan, scan.identity(&title_of(&arguments.input)));
+    let (of, here) = (&recipe.head.scan, scan.identity(&scan.name()));
+    let input = inputs_in_words(&arguments.inputs);
     if of.is_same_content(&here) {
         return Ok(true);
     }
     if of.n_points != here.n_points {
         return Err(anyhow!(
-            "{} is of {} with {} points, and {} has {}: give the scan that it was made for",
+            "{} is of {} with {} points, and {input} has {}: give the scan that it was made for",
             arguments.recipe.display(),
             of.name,
             of.n_points,
-            arguments.input.display(),
             here.n_points
         ));
     }
     if !arguments.same_points {
         return Err(anyhow!(
-            "{} is not the content that {} was made for ({}): give that, or say --same-points if it holds the same points in the same order",
-            arguments.input.display(),
+            "{input} is not the content that {} was made for ({}): give that, or say --same-points if it holds the same points in the same order",
             arguments.recipe.display(),
             of.name
         ));
@@ -267,11 +303,12 @@ fn propagation(session: &Session, parameters: Parameters, progress: &dyn Progres
 /// A file that cannot be read, no folder for journals, a journal of other events.
 pub fn rehearse(arguments: &RehearseArguments) -> anyhow::Result<Outcome> {
     let recipe = recipe::read(&arguments.recipe)?.recipe;
-    let scan = normend_io::read(&arguments.input, &Silent)?;
+    let scan = read_scan(&arguments.inputs, &recipe.head.scan, &Silent)?;
     let folder = normend_app::folders::state_folder().context("the system names no folder for journals")?;
     let folder = folder.join("journals");
     let places = ScannerPlaces::read(&scan, ScannerFiles::default(), &Silent)?;
-    let mut session = Session::new(scan, title_of(&arguments.input));
+    let name = scan.name();
+    let mut session = Session::new(scan, name);
     session.scanner.places = places;
     session.begin_with(recipe.head.parameters);
     let offer = found::find(&folder, &session.identity(), Duration::ZERO)

@@ -12,6 +12,7 @@ use crate::coloring::Coloring;
 use crate::compare::Style;
 
 use crate::components::ComponentAction;
+use crate::layers::LayerAction;
 use crate::panels::export::ExportOrder;
 use crate::scanner_view::ScannerAction;
 use crate::settings::ThemeChoice;
@@ -32,6 +33,12 @@ pub enum Action {
     Run(Command),
     /// Open this scan.
     OpenScan(PathBuf),
+    /// Open these files as layers of one scan.
+    OpenFiles(Vec<PathBuf>),
+    /// Open these files as further layers of the open scan.
+    AddFiles(Vec<PathBuf>),
+    /// Do something with a file of the scan.
+    Layers(LayerAction),
     /// Open this recipe for the scan.
     OpenRecipe(PathBuf),
     /// Light or dark.

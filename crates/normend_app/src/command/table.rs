@@ -69,9 +69,11 @@ macro_rules! commands {
 
 commands! {
     // File.
-    Open: File 0, "Open…", "Open a scan with the system's file dialog", [ctrl(Key::O)];
+    Open: File 0, "Open…", "Open a scan with the system's file dialog; several files become layers of one", [ctrl(Key::O)];
     OpenPath: File 0, "Open path…", "Open a scan by typing its path", [ctrl_shift(Key::O)];
+    AddFiles: File 0, "Add files…", "Open more files as layers of this scan; what you decided stays", [];
     OpenSample: File 0, "Open the sample", "Open the small scan that comes with Normend", [];
+    Columns: File 0, "Columns…", "See what the columns of this text were taken for, and change it", [];
     OpenReference: File 0, "Compare with reference…",
         "Count the wrong points against another file of the same scan", [];
     OpenReferencePath: File 0, "Compare with reference by path…", "Type the path of the reference", [];

@@ -95,8 +95,10 @@ pub enum Decision {
 /// What is written, and where.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExportOrder {
-    /// The file.
+    /// The file; of a scan of several, the first one's.
     pub path: PathBuf,
+    /// Where the other files of the scan go, in their order; empty for a scan of one.
+    pub further: Vec<PathBuf>,
     /// The user agreed to replace the file that was opened.
     pub overwrite_input: bool,
     /// And that the changes of another program are lost with it.
@@ -278,6 +280,7 @@ impl ExportWindow {
                     (None, Some(path)) => {
                         decision = Decision::Export(ExportOrder {
                             path,
+                            further: Vec::new(),
                             overwrite_input: existing == Existing::Input,
                             overwrite_changed: existing == Existing::Input && self.is_input_changed,
                             with_confidence: self.with_confidence,

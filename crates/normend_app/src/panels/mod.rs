@@ -4,12 +4,15 @@ use crate::command::Command;
 
 pub mod about;
 pub mod compare;
+pub mod columns;
 pub mod components;
 pub mod context_menu;
 pub mod empty;
 pub mod export;
+pub mod export_layers;
 pub mod hints;
 pub mod history;
+pub mod layers;
 pub mod menu_bar;
 pub mod messages;
 pub(crate) mod modal;

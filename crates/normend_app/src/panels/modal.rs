@@ -5,7 +5,9 @@ use std::sync::Arc;
 use egui::{Id, Key, RichText, Ui};
 use normend_io::recipe::Recipe;
 
+use super::columns::ColumnsWindow;
 use super::export::ExportWindow;
+use super::export_layers::LayersWindow;
 use super::open_path::OpenPathWindow;
 use super::palette::PaletteWindow;
 use super::screenshot::PictureWindow;
@@ -17,6 +19,8 @@ use crate::theme::{SPACE_L, SPACE_S};
 pub(crate) enum Modal {
     /// Where the oriented scan goes.
     Export(ExportWindow),
+    /// Where each file of it goes.
+    ExportLayers(LayersWindow),
     /// Which scan to open.
     OpenPath(OpenPathWindow),
     /// Where the recipe goes; `of_offer` when it is made of a journal that is offered.
@@ -25,6 +29,8 @@ pub(crate) enum Modal {
     Restore,
     /// Whether a recipe of another file is meant.
     OtherScan { recipe: Arc<Recipe>, name: String },
+    /// What the columns of the text are.
+    Columns(ColumnsWindow),
     /// Pictures of the view.
     Picture(PictureWindow),
     /// What to do, found by a few letters.

@@ -23,6 +23,8 @@ pub enum What {
     /// A scan.
     #[default]
     Scan,
+    /// A file that is added to the open scan.
+    Layer,
     /// A recipe, for the scan that is open.
     Recipe,
     /// A file that the open scan is compared with.
@@ -54,6 +56,7 @@ impl OpenPathWindow {
     pub fn ui(&mut self, ui: &Ui) -> Decision {
         let title = match self.what {
             What::Scan => "Open a scan",
+            What::Layer => "Add a file",
             What::Recipe => "Open a recipe",
             What::Reference => "Compare with a reference",
         };
@@ -67,6 +70,7 @@ impl OpenPathWindow {
         }
         let label = ui.label(match self.what {
             What::Scan => "Path of the scan",
+            What::Layer => "Path of the file",
             What::Recipe => "Path of the recipe",
             What::Reference => "Path of the reference",
         });

@@ -135,6 +135,10 @@ impl ViewTab<'_> {
                 None
             }
             Coloring::File => None,
+            Coloring::Layers => {
+                weak(ui, "The Orient tab lists the files with their colors.");
+                None
+            }
             Coloring::Conflict => {
                 values::color_bar(ui, &coloring::conflict_scale, "Nothing against it", "All against it");
                 ui.horizontal(|ui| values::swatch(ui, coloring::UNKNOWN, "Nothing is known"));

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::command::Keymap;
 use crate::panels::side::SideTab;
+use crate::text_columns::KnownColumns;
 use crate::theme;
 use crate::viewport::NavigationSettings;
 pub use display::{DisplaySettings, HAIR_LENGTHS, HAIR_STEPS};
@@ -173,6 +174,8 @@ pub struct Settings {
     pub dismissed_hints: BTreeSet<String>,
     /// The file name of the last crash report that the user was told of.
     pub told_crash: String,
+    /// What the user said of the columns of texts, newest first.
+    pub columns: Vec<KnownColumns>,
 }
 
 impl Default for Settings {
@@ -196,6 +199,7 @@ impl Default for Settings {
             shows_hints: true,
             dismissed_hints: BTreeSet::new(),
             told_crash: String::new(),
+            columns: Vec::new(),
         }
     }
 }
