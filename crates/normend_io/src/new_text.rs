@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use normend_core::Progress;
+use normend_core::progress::Part;
 
+use crate::columns::{INTENSITY_NAMES, color_byte, colors_among};
 use crate::error::WriteError;
 use crate::new_file::{Loss, NewFile, plain_names};
 use crate::output::Output;
@@ -42,9 +44,26 @@ impl TextStyle {
 /// Drops what the text cannot hold.
 pub(crate) fn limit(file: &mut NewFile<'_>, path: &Path) -> Vec<Loss> {
     match TextStyle::of_path(path) {
-        TextStyle::Pts => file.drop_fields(|_| Some("the columns of PTS have no names; write .csv or .xyz".into())),
+        TextStyle::Pts => {
+            let kept: Vec<String> = (places(file).into_iter())
+                .map(|field| file.fields[field].name.clone())
+                .collect();
+            file.drop_fields(|field| {
+                let is_kept = kept.contains(&field.name);
+                (!is_kept).then(|| "the columns of PTS have no names; write .csv or .xyz".into())
+            })
+        }
         TextStyle::Plain | TextStyle::Csv => Vec::new(),
     }
+}
+
+/// The fields that have their places in a PTS: intensity, then colors.
+fn places(file: &NewFile<'_>) -> Vec<usize> {
+    let names = || file.fields.iter().map(|field| field.name.as_str());
+    let is_intensity = |name: &str| INTENSITY_NAMES.iter().any(|wanted| name.eq_ignore_ascii_case(wanted));
+    let intensity = names().position(is_intensity);
+    let colors = colors_among(names());
+    intensity.into_iter().chain(colors.into_iter().flatten()).collect()
 }
 
 /// Whether the text can hold confidence.
@@ -57,6 +76,9 @@ pub(crate) fn write(file: &mut NewFile<'_>, out: &mut Output<'_>, progress: &dyn
     let style = TextStyle::of_path(out.path);
     let separator = if style == TextStyle::Csv { b',' } else { b' ' };
     out.write(head(file, style).as_bytes())?;
+    if style == TextStyle::Pts {
+        return write_pts(file, out, progress);
+    }
     file.write_rows(
         |row, out| {
             row.push_coordinates(file.coordinates, separator, out);
@@ -78,6 +100,37 @@ pub(crate) fn write(file: &mut NewFile<'_>, out: &mut Output<'_>, progress: &dyn
         },
         out,
         progress,
+    )
+}
+
+/// Writes the rows of a PTS: `x y z [intensity] [r g b] [nx ny nz]`, colors in 8 bits.
+fn write_pts(file: &NewFile<'_>, out: &mut Output<'_>, progress: &dyn Progress) -> Result<(), WriteError> {
+    let places = places(file);
+    let colors = colors_among(file.fields.iter().map(|field| field.name.as_str()));
+    let white = match colors {
+        Some(colors) => file.color_scale(colors, &Part::new(progress, 0.0..0.3))?.white,
+        None => 255.0,
+    };
+    file.write_rows(
+        |row, out| {
+            row.push_coordinates(file.coordinates, b' ', out);
+            for &field in &places {
+                out.push(b' ');
+                if colors.is_some_and(|colors| colors.contains(&field)) {
+                    let byte = color_byte(row.cells[field].number(), white);
+                    out.extend_from_slice(byte.to_string().as_bytes());
+                } else {
+                    row.cells[field].push_text(out);
+                }
+            }
+            for value in row.normal.iter().flat_map(glam::Vec3::to_array) {
+                out.push(b' ');
+                ValueType::Text.write(value, out);
+            }
+            out.push(b'\n');
+        },
+        out,
+        &Part::new(progress, 0.3..1.0),
     )
 }
 
