@@ -9,7 +9,6 @@ use crate::app::{App, Leaving};
 use crate::command::{Action, Command};
 use crate::compare::Style;
 use crate::crash;
-use crate::dialogs::{DialogAnswer, DialogPurpose};
 use crate::job::JobError;
 use crate::panels::export::ExportOrder;
 use crate::panels::modal::Modal;
@@ -440,69 +439,6 @@ impl App {
         let options = files.map(|file| self.settings.settings.read_options(&file)).collect();
         self.added = None;
         self.work = Some(Work::open(&self.ctx, origin, options, self.journal_folder(), uploader));
-    }
-
-    pub(crate) fn take_dialogs(&mut self) {
-        while let Some((purpose, answer)) = self.dialogs.poll() {
-            let note = "This system shows no file dialog (it needs a desktop portal or zenity). Type the path instead.";
-            match (purpose, answer) {
-                (_, DialogAnswer::Cancelled) => {}
-                (DialogPurpose::Open | DialogPurpose::Add, _) if self.windows.modal.is_some() => {
-                    self.messages.note("No scan was opened: answer the open window first.");
-                }
-                (DialogPurpose::Open, DialogAnswer::Picked(path)) => self.act(Action::OpenScan(path)),
-                (DialogPurpose::Open, DialogAnswer::Several(paths)) => self.act(Action::OpenFiles(paths)),
-                (DialogPurpose::Add, DialogAnswer::Picked(path)) => self.act(Action::AddFiles(vec![path])),
-                (DialogPurpose::Add, DialogAnswer::Several(paths)) => self.act(Action::AddFiles(paths)),
-                (DialogPurpose::Add, DialogAnswer::Unavailable) => {
-                    self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(What::Layer, Some(note.to_owned()))));
-                }
-                (DialogPurpose::ExportFolder, DialogAnswer::Picked(folder)) => {
-                    if let Some(Modal::ExportLayers(window)) = &mut self.windows.modal {
-                        window.set_folder(&folder);
-                    }
-                }
-                // Only scans are picked several at a time.
-                (_, DialogAnswer::Several(_)) => {}
-                (DialogPurpose::Open, DialogAnswer::Unavailable) => {
-                    self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(What::Scan, Some(note.to_owned()))));
-                }
-                (DialogPurpose::OpenRecipe, _) if self.windows.modal.is_some() => {
-                    self.messages
-                        .note("No recipe was opened: answer the open window first.");
-                }
-                (DialogPurpose::OpenRecipe, DialogAnswer::Picked(path)) => self.act(Action::OpenRecipe(path)),
-                (DialogPurpose::OpenRecipe, DialogAnswer::Unavailable) => {
-                    self.windows.modal = Some(Modal::OpenPath(OpenPathWindow::new(
-                        What::Recipe,
-                        Some(note.to_owned()),
-                    )));
-                }
-                (DialogPurpose::OpenReference, _) if self.windows.modal.is_some() => {
-                    self.messages
-                        .note("No reference was opened: answer the open window first.");
-                }
-                (DialogPurpose::OpenReference, DialogAnswer::Picked(path)) => self.act(Action::OpenReference(path)),
-                (DialogPurpose::OpenReference, DialogAnswer::Unavailable) => {
-                    let window = OpenPathWindow::new(What::Reference, Some(note.to_owned()));
-                    self.windows.modal = Some(Modal::OpenPath(window));
-                }
-                (DialogPurpose::SaveRecipe, DialogAnswer::Picked(path)) => {
-                    if let Some(Modal::SaveRecipe { window, .. }) = &mut self.windows.modal {
-                        window.set_path(&path);
-                    }
-                }
-                (DialogPurpose::Export, DialogAnswer::Picked(path)) => {
-                    if let Some(Modal::Export(window)) = &mut self.windows.modal {
-                        window.set_path(&path);
-                    }
-                }
-                (
-                    DialogPurpose::Export | DialogPurpose::ExportFolder | DialogPurpose::SaveRecipe,
-                    DialogAnswer::Unavailable,
-                ) => self.messages.note(note),
-            }
-        }
     }
 
     pub(crate) fn take_work(&mut self) {
