@@ -191,7 +191,8 @@ fn vertices_that_are_no_points() {
     );
     check(
         format!("ply\nformat ascii 1.0\nelement vertex 2\n{XYZ}end_header\n0 0 0\n1e30 0 0\n").as_bytes(),
-        ": the points span 1e30 units; Normend works with spans between 1e-15 and 1e15: change the unit",
+        ": the points span 1e30 units; Normend works with spans between 1e-15 and 1e15: change the unit, or take out \
+         points that are far from all others",
     );
 }
 
@@ -315,12 +316,12 @@ fn text_without_a_header() {
         ", line 2: \"north east up\" does not begin with a number: correct or remove the line",
     );
     check(
-        "1,5;2,5;3,5\n",
-        ", line 1: \"1,5;2,5;3,5\" has commas besides other separators, as in decimal commas: write numbers with a point",
+        "1,5;2.5;3,5\n",
+        ", line 1: \"1,5;2.5;3,5\" has commas besides other separators, which are no decimal commas either: write numbers with a point",
     );
     check(
-        "1,5 2,5 3,5\n",
-        ", line 1: \"1,5 2,5 3,5\" has commas besides other separators, as in decimal commas: write numbers with a point",
+        "1,5,3 2 3\n",
+        ", line 1: \"1,5,3 2 3\" has commas besides other separators, which are no decimal commas either: write numbers with a point",
     );
     check(
         "3\n1 2 3\n4 5 6\n",
