@@ -71,7 +71,7 @@ fn check_finite(scan: &Scan) {
         assert_eq!(normals.len(), n_points);
         assert!(normals.iter().all(|normal| normal.is_finite()));
     }
-    if let Some(rows) = &scan.rows {
+    if let Some(rows) = scan.rows() {
         assert_eq!(rows.len(), n_points);
         assert!(rows.is_sorted_by(|a, b| a < b), "rows are not in their order");
         assert!(rows.iter().all(|&row| (row as usize) < n_points + scan.n_left_out));
@@ -108,29 +108,30 @@ fn check_written(scan: &Scan, extension: &str) {
     let again = read(&path, &Silent);
     let again = again.unwrap_or_else(|error| panic!("what was written as {extension} cannot be read: {error}"));
     fs::remove_file(&path).expect("the file is gone");
-    let is_same_format = scan.format == again.format;
+    let is_same_format = scan.format() == again.format();
     assert_eq!(scan.cloud.n_points(), again.cloud.n_points(), "points as {extension}");
     // In another format coordinates are rounded where a pose was taken off, and rows that are no points may be left out.
-    let has_frames = matches!(scan.format, FileFormat::E57 | FileFormat::Ptx);
+    let has_frames = matches!(scan.format(), FileFormat::E57 | FileFormat::Ptx);
     if is_same_format {
         check_same_points(&scan.cloud, &again.cloud, extension);
         assert_eq!(
             again.n_left_out, scan.n_left_out,
             "rows without a point, as {extension}"
         );
-        assert_eq!(again.rows, scan.rows, "rows of the points, as {extension}");
+        assert_eq!(again.rows(), scan.rows(), "rows of the points, as {extension}");
     } else if !has_frames {
         check_near_points(&scan.cloud, &again.cloud, extension);
     }
     // Text whose columns have no names tells normals only when there are six; a copy of it adds no names.
-    let has_odd_rows = scan.n_left_out > 0 && again.format == FileFormat::Xyz;
-    let is_untold = (is_same_format && scan.format == FileFormat::Xyz || has_odd_rows) && again.given_normals.is_none();
+    let has_odd_rows = scan.n_left_out > 0 && again.format() == FileFormat::Xyz;
+    let is_untold =
+        (is_same_format && scan.format() == FileFormat::Xyz || has_odd_rows) && again.given_normals.is_none();
     if !is_untold {
         let given = again.given_normals.as_ref();
         let given = given.unwrap_or_else(|| panic!("there are no normals as {extension}"));
         for (point, (&given, &written)) in given.iter().zip(&normals).enumerate() {
             // Poses turn normals, and back; in LAS they may be whole numbers of steps.
-            let is_near = (has_frames || scan.format == FileFormat::Las) && given.distance(written) < 0.02;
+            let is_near = (has_frames || scan.format() == FileFormat::Las) && given.distance(written) < 0.02;
             let is_same = given == written || is_near;
             assert!(is_same, "normal {point} is {given} instead of {written} as {extension}");
         }
