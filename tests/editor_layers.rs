@@ -83,7 +83,9 @@ fn files_are_layers_that_are_hidden_selected_and_exported() {
     let before = editor.normals();
     editor.harness.state_mut().act(Command::Flip.into());
     let first = before[0];
-    editor.wait("the flip", |app| app.document().unwrap().oriented_normals().unwrap()[0] == -first);
+    editor.wait("the flip", |app| {
+        app.document().unwrap().oriented_normals().unwrap()[0] == -first
+    });
     editor.harness.run_steps(2);
     editor.key(Modifiers::COMMAND, Key::E);
     assert!(editor.shows("Export 2 files"), "one window for both");
@@ -91,7 +93,11 @@ fn files_are_layers_that_are_hidden_selected_and_exported() {
     editor.click_button("Export 2 files");
     editor.wait("the export", |app| !app.is_busy());
     editor.harness.run_steps(2);
-    assert!(editor.said("Exported 2,000 points"), "{:?}", editor.app().messages().entries());
+    assert!(
+        editor.said("Exported 2,000 points"),
+        "{:?}",
+        editor.app().messages().entries()
+    );
     assert!(!editor.app().is_unsaved());
     let normals = editor.normals();
     assert!(normals.iter().zip(&before).all(|(now, before)| *now == -*before));
@@ -108,7 +114,10 @@ fn files_are_layers_that_are_hidden_selected_and_exported() {
     let again = ["upper_oriented.ply", "lower_oriented.xyz"].map(|name| folder.join(name));
     editor.harness.state_mut().act(Action::OpenFiles(again.to_vec()));
     editor.wait("the exported files", |app| {
-        !app.is_busy() && app.document().is_some_and(|document| document.given_normals().is_some())
+        !app.is_busy()
+            && app
+                .document()
+                .is_some_and(|document| document.given_normals().is_some())
     });
     editor.wait_until_oriented();
     assert!(editor.normals().iter().zip(&normals).all(is_close));

@@ -73,11 +73,7 @@ impl Arguments {
             let is_second_scan =
                 error.kind() == ErrorKind::ArgumentConflict && error.get(ContextKind::InvalidSubcommand).is_some();
             if is_second_scan {
-                usage_error(
-                    None,
-                    "a command (orient, check, …) comes first, then the files",
-                )
-                .exit()
+                usage_error(None, "a command (orient, check, …) comes first, then the files").exit()
             }
             error.exit()
         });
@@ -197,7 +193,11 @@ impl ReadArguments {
 /// Parses names with spaces or commas between them.
 fn column_names(typed: &str) -> Result<ColumnNames, String> {
     let is_separator = |letter: char| letter.is_whitespace() || letter == ',' || letter == ';';
-    let names: Vec<String> = typed.split(is_separator).filter(|name| !name.is_empty()).map(str::to_owned).collect();
+    let names: Vec<String> = typed
+        .split(is_separator)
+        .filter(|name| !name.is_empty())
+        .map(str::to_owned)
+        .collect();
     let has = |wanted: &str| names.iter().any(|name| name.eq_ignore_ascii_case(wanted));
     if ["x", "y", "z"].into_iter().all(has) {
         Ok(ColumnNames(names))
@@ -576,9 +576,9 @@ mod tests {
     fn a_file_opens_the_editor_and_a_name_runs_a_command() {
         let opened = Arguments::try_parse_from(["normend", "scan.ply"]).unwrap();
         assert!(opened.command.is_none());
-        assert_eq!(opened.scan, Some(PathBuf::from("scan.ply")));
+        assert_eq!(opened.scans, [PathBuf::from("scan.ply")]);
         let empty = Arguments::try_parse_from(["normend"]).unwrap();
-        assert!(empty.command.is_none() && empty.scan.is_none());
+        assert!(empty.command.is_none() && empty.scans.is_empty());
         let oriented = Arguments::try_parse_from(["normend", "orient", "a.ply", "-o", "b.ply"]).unwrap();
         assert!(matches!(oriented.command, Some(Command::Orient(_))));
     }

@@ -97,8 +97,10 @@ impl SourceKind {
             }
             Self::Pinned => "Points that you pinned as right. Nothing turns them until you unpin them.",
             Self::Voted => "Points that viewpoints around the scan see clearly. Those that you make overrule them.",
-            Self::Scanner => "The places that the scan was taken from: of its file, a table beside it or your own, or the one that the points tell. \
-                 Normals face them.",
+            Self::Scanner => {
+                "The places that the scan was taken from: of its file, a table beside it or your own, or the one that the points tell. \
+                 Normals face them."
+            }
             Self::File => "The normals that came with the file, and their sides.",
         }
     }
@@ -171,7 +173,8 @@ impl SourceKinds {
         counts[SourceKind::Flipped as usize] = marks.free().len();
         counts[SourceKind::Pinned as usize] = marks.pinned().len();
         counts[SourceKind::Voted as usize] += propagation.voted_sources.len() as u64;
-        counts[SourceKind::Scanner as usize] = u64::from(propagation.found_station.is_some()) + u64::from(propagation.has_track);
+        counts[SourceKind::Scanner as usize] =
+            u64::from(propagation.found_station.is_some()) + u64::from(propagation.has_track);
         let mut places: Vec<_> = propagation.stations.iter().map(|station| station.position).collect();
         // Pieces of one place follow one another.
         places.dedup();

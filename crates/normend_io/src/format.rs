@@ -31,7 +31,15 @@ pub enum FileFormat {
 
 impl FileFormat {
     /// All formats, in the order of dialogs.
-    pub const ALL: [Self; 7] = [Self::Ply, Self::Las, Self::Pcd, Self::Obj, Self::Xyz, Self::E57, Self::Ptx];
+    pub const ALL: [Self; 7] = [
+        Self::Ply,
+        Self::Las,
+        Self::Pcd,
+        Self::Obj,
+        Self::Xyz,
+        Self::E57,
+        Self::Ptx,
+    ];
 
     /// The name in dialogs.
     pub fn label(self) -> &'static str {

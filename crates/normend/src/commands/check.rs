@@ -42,7 +42,12 @@ struct Report<'a> {
 pub fn run(arguments: &CheckArguments) -> anyhow::Result<Outcome> {
     prepare(&arguments.common)?;
     let bar = Bar::new(&title_of(&arguments.result), arguments.common.quiet);
-    let reference = super::read(&arguments.reference, &arguments.reading, &bar, &Part::new(&bar, 0.0..0.2))?;
+    let reference = super::read(
+        &arguments.reference,
+        &arguments.reading,
+        &bar,
+        &Part::new(&bar, 0.0..0.2),
+    )?;
     let reference_normals = normals_of(&reference, &arguments.reference)?;
     let result = super::read(&arguments.result, &arguments.reading, &bar, &Part::new(&bar, 0.2..0.4))?;
     let result_normals = normals_of(&result, &arguments.result)?;

@@ -329,7 +329,13 @@ fn what_is_no_file_is_no_journal() {
     drop(journal);
     let name = |number: u32| path.with_file_name(format!("0101010101010101-a_scan.ply-{number}.journal"));
     // Nobody ever writes into this pipe: reading it would wait forever. The device has no end.
-    assert!(std::process::Command::new("mkfifo").arg(name(2)).status().unwrap().success());
+    assert!(
+        std::process::Command::new("mkfifo")
+            .arg(name(2))
+            .status()
+            .unwrap()
+            .success()
+    );
     std::os::unix::fs::symlink("/dev/zero", name(3)).unwrap();
     let elsewhere = folder.path().join("elsewhere");
     fs::copy(&path, &elsewhere).unwrap();

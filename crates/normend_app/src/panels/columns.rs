@@ -49,7 +49,11 @@ impl ColumnsWindow {
     }
 
     fn content(&mut self, ui: &mut Ui) -> Decision {
-        let marks = if self.columns.has_decimal_commas { "commas" } else { "points" };
+        let marks = if self.columns.has_decimal_commas {
+            "commas"
+        } else {
+            "points"
+        };
         let how = format!(
             "{} has {} with {} between them and numbers with decimal {marks}. Columns that are nothing in particular are kept as \
              they are.",
@@ -60,18 +64,21 @@ impl ColumnsWindow {
         ui.add(egui::Label::new(RichText::new(how).weak()).wrap());
         ui.add_space(SPACE_S);
         ScrollArea::horizontal().show(ui, |ui| {
-            Grid::new("columns").striped(true).spacing([SPACE_M, SPACE_S]).show(ui, |ui| {
-                for (index, chosen) in self.chosen.iter_mut().enumerate() {
-                    role(ui, index, &self.columns.names[index], chosen);
-                }
-                ui.end_row();
-                for row in &self.columns.sample {
-                    for value in row {
-                        ui.label(RichText::new(theme::elided(value, 12)).monospace());
+            Grid::new("columns")
+                .striped(true)
+                .spacing([SPACE_M, SPACE_S])
+                .show(ui, |ui| {
+                    for (index, chosen) in self.chosen.iter_mut().enumerate() {
+                        role(ui, index, &self.columns.names[index], chosen);
                     }
                     ui.end_row();
-                }
-            });
+                    for row in &self.columns.sample {
+                        for value in row {
+                            ui.label(RichText::new(theme::elided(value, 12)).monospace());
+                        }
+                        ui.end_row();
+                    }
+                });
         });
         ui.add_space(SPACE_S);
         let problem = problem(&self.chosen);
@@ -106,7 +113,13 @@ impl ColumnsWindow {
 
 /// The list of what a column can be.
 fn role(ui: &mut Ui, index: usize, own: &str, chosen: &mut String) {
-    let shown = |name: &str| if name.is_empty() { "–".to_owned() } else { name.to_owned() };
+    let shown = |name: &str| {
+        if name.is_empty() {
+            "–".to_owned()
+        } else {
+            name.to_owned()
+        }
+    };
     let list = ComboBox::from_id_salt(("column", index))
         .width(COLUMN_WIDTH)
         .selected_text(shown(chosen))

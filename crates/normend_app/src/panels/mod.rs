@@ -3,8 +3,8 @@
 use crate::command::Command;
 
 pub mod about;
-pub mod compare;
 pub mod columns;
+pub mod compare;
 pub mod components;
 pub mod context_menu;
 pub mod empty;
@@ -24,6 +24,7 @@ pub mod preferences;
 pub mod progress;
 pub mod proposal;
 pub mod restore;
+pub mod scanner;
 pub(crate) mod screenshot;
 pub mod shortcuts;
 pub mod side;
@@ -35,7 +36,6 @@ pub mod tool_bar;
 pub mod unsaved;
 pub mod values;
 pub mod view;
-pub mod scanner;
 pub mod viewpoints;
 pub mod votes;
 
