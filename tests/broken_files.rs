@@ -332,10 +332,6 @@ fn text_without_a_header() {
         ", line 2: 1 values where at least 3 belong: correct or remove the line \"7\"",
     );
     check(
-        "x,y,z,nx,ny,nz\n1,2,3,0,0,1\n1,2,3,,0,1\n",
-        ", line 3: nx is \"\", which is not a number: correct it",
-    );
-    check(
         "x;y;z;nx;ny;nz\n1;2;3;0;0;1\n1;2;3\n",
         ", line 3: 3 values where at least 6 belong: correct or remove the line \"1;2;3\"",
     );

@@ -479,8 +479,6 @@ fn wrong_use_is_told_with_the_usage_of_its_command() {
     );
     check("render a.ply -o a.jpg", &["Usage: normend render"]);
     check("generate torus -o a.stl", &["Usage: normend generate"]);
-    check("a.ply extra", &["opens one scan", "Usage: normend ["]);
-    check("a.ply orient", &["opens one scan", "comes first"]);
     check("frob", &["no file and no command", "'frob'", "Usage: normend ["]);
 }
 

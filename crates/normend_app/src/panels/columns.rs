@@ -125,8 +125,9 @@ fn role(ui: &mut Ui, index: usize, own: &str, chosen: &mut String) {
         .selected_text(shown(chosen))
         .show_ui(ui, |ui| {
             let is_role = |name: &str| ROLES.contains(&name);
-            let others = [own, ""].into_iter().filter(|name| !is_role(name));
-            for name in ROLES.into_iter().chain(others) {
+            // Nothing comes first: it is chosen most, and the end of the list has to be scrolled to.
+            let own = [own].into_iter().filter(|name| !name.is_empty() && !is_role(name));
+            for name in [""].into_iter().chain(own).chain(ROLES) {
                 ui.selectable_value(chosen, name.to_owned(), shown(name));
             }
         });

@@ -29,7 +29,11 @@ pub fn ui(ui: &mut Ui, session: &mut Session, blocked: Option<&str>) -> Option<A
         action = action.or(listed);
     }
     if session.document.propagation().is_some() {
-        action = scanner::ui(ui, session, blocked).or(action);
+        // Places that are known come first; the field to type one is seldom needed.
+        let has_places = session.scanner.places.words().is_some() || !session.document.state().scanner.own.is_empty();
+        if has_places {
+            action = scanner::ui(ui, session, blocked).or(action);
+        }
         let voted = theme::section_about(ui, "Votes", votes::ABOUT, |ui| {
             ui.add_enabled_ui(blocked.is_none(), |ui| votes::ui(ui, session)).inner
         });
@@ -39,6 +43,9 @@ pub fn ui(ui: &mut Ui, session: &mut Session, blocked: Option<&str>) -> Option<A
             components::ui(ui, session, blocked)
         });
         action = action.or(parts);
+        if !has_places {
+            action = scanner::ui(ui, session, blocked).or(action);
+        }
     }
     action
 }

@@ -49,7 +49,8 @@ fn fallback(cloud: &PointCloud, reach: &[f32]) -> f32 {
         return if cloud.diagonal() > 0.0 {
             0.05 * cloud.diagonal()
         } else {
-            1.0
+            // All is in one place, which a view shows from a distance of 1.
+            0.05
         };
     }
     let middle = positive.len() / 2;

@@ -378,7 +378,9 @@ struct XyzRows<'a> {
 impl<'a> XyzRows<'a> {
     fn new(layout: &'a XyzLayout, bytes: &'a [u8], start: usize) -> Self {
         let columns = &layout.columns;
-        let n_columns = columns.iter().flatten().max().map_or(0, |last| last + 1);
+        // All that a row needs is counted, also where fewer values are asked for.
+        let n_asked = columns.iter().flatten().max().map_or(0, |last| last + 1);
+        let n_columns = n_asked.max(layout.n_required);
         Self {
             layout,
             bytes,
