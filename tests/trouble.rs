@@ -307,7 +307,12 @@ fn each_case_is_checked_searched_and_drawn() {
                 let picture = image::open(folder.path().join("picture.png")).unwrap().to_rgba8();
                 let n_drawn = picture.pixels().filter(|pixel| pixel.0[3] > 0).count();
                 assert!(n_drawn > 0, "nothing is seen of {input} of {scan} from {view}");
-                assert!(n_drawn < 160 * 120, "{input} of {scan} fills the picture from {view}");
+                // The discs of a few points are as large as the cloud.
+                let are_few = (2..20).contains(&case.points.len());
+                assert!(
+                    are_few || n_drawn < 160 * 120,
+                    "{input} of {scan} fills the picture from {view}"
+                );
             }
         }
     }
