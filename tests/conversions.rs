@@ -1,5 +1,7 @@
 //! From every format to every other and back: what the formats hold comes through, and what they do not is named.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests fail as tests do, by panicking")]
+
 use std::fs;
 use std::path::Path;
 
@@ -7,8 +9,11 @@ use normend_core::Silent;
 use normend_io::{FileFormat, Scan, WriteOptions, read, read_bytes};
 use proptest::prelude::*;
 
+/// Millimeters from a corner, a color, and a number of each of three types.
+type Row = ([i32; 3], [u8; 3], i16, f32, f64);
+
 /// A PLY with normals, colors, and numbers of every type; georeferenced, with millimetres.
-fn ply(rows: &[([i32; 3], [u8; 3], i16, f32, f64)]) -> Vec<u8> {
+fn ply(rows: &[Row]) -> Vec<u8> {
     let mut bytes = format!(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
          property float nx\nproperty float ny\nproperty float nz\nproperty uchar red\nproperty uchar green\n\
@@ -31,7 +36,7 @@ fn ply(rows: &[([i32; 3], [u8; 3], i16, f32, f64)]) -> Vec<u8> {
     bytes
 }
 
-fn rows() -> impl Strategy<Value = Vec<([i32; 3], [u8; 3], i16, f32, f64)>> {
+fn rows() -> impl Strategy<Value = Vec<Row>> {
     let row = (
         prop::array::uniform3(-2_000_000..2_000_000),
         any::<[u8; 3]>(),

@@ -119,7 +119,7 @@ fn a_trajectory_tells_the_place_of_each_point_by_its_time() {
     let points: Vec<Vec3> = (0..n).map(point).collect();
     let truth: Vec<Vec3> = points
         .iter()
-        .map(|point| -Vec3::new(0.0, point.y, point.z).normalize())
+        .map(|point| -Vec3::new(0.0, point.y, point.z).normalize_or_zero())
         .collect();
     let mut text = "x,y,z,gps_time\n".to_owned();
     for point in &points {

@@ -131,9 +131,9 @@ impl Patches {
         // Places of several points become patches, before all others.
         let mut n_places = 0;
         let mut nodes = vec![0_u32; self.parents.len()];
-        for place in 0..self.n_points {
+        for (place, node) in nodes[..self.n_points].iter_mut().enumerate() {
             let first = places.first(place as u32);
-            nodes[place] = match places.copies(place as u32) {
+            *node = match places.copies(place as u32) {
                 [] => first,
                 _ => {
                     n_places += 1;

@@ -304,7 +304,7 @@ fn a_journal_follows_its_scan_to_another_content() {
     journal.follow(scan(3, "/a scan.ply"));
     select(&mut journal, 2..3);
     // Held, under either content.
-    assert_eq!(find(3).held, [path.clone()]);
+    assert_eq!(find(3).held, std::slice::from_ref(&path));
     assert!(found::is_held(&path));
     // An editor that closes at once writes it anew all the same.
     drop(journal);

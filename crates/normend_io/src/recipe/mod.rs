@@ -92,6 +92,7 @@ pub struct RecordedStep {
 
 /// What happened.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "steps are what nearly all events are")]
 pub enum Event {
     /// A step was done; what was undone before is forgotten.
     Step(RecordedStep),

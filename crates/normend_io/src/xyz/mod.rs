@@ -186,8 +186,8 @@ impl XyzLayout {
                     *shown = name.to_owned();
                 }
             };
-            for slot in COORDINATES.start..NORMAL.end {
-                name(self.columns[slot], VALUE_NAMES[slot]);
+            for (&column, value) in self.columns.iter().zip(VALUE_NAMES).take(NORMAL.end) {
+                name(column, value);
             }
             self.name_by_look(bytes, &mut names);
         }
