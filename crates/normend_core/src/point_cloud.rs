@@ -194,7 +194,7 @@ impl PointCloud {
     }
 
     /// Whether points stand so close that `f32`, over the extent of the cloud, rounds away what matters: one in a hundred or more
-    /// shares a cell of [`COARSE`] steps with another one. Where not, normals are off by less than a twentieth of a degree for that.
+    /// shares a cell of `COARSE` steps with another one. Where not, normals are off by less than a twentieth of a degree for that.
     /// O(n log n), in parallel; 8 bytes a point while it works.
     pub fn is_coarse(&self) -> bool {
         let cell = COARSE * self.float_step();

@@ -265,7 +265,7 @@ pub enum Positions<'a> {
     Double(&'a [DVec3]),
 }
 
-/// Writes a fresh cloud, with `n` unit normals or without, as [`Scan::write`] does: binary little-endian PLY, or text
+/// Writes a fresh cloud, with `n` unit normals or without, as [`crate::Scan::write`] does: binary little-endian PLY, or text
 /// when the extension says so ([`FileFormat::of_target`]). A file that is there is replaced.
 ///
 /// # Errors
@@ -306,7 +306,7 @@ pub fn write_points(
     })
 }
 
-/// Writes `bytes` to `path` as [`Scan::write`] writes scans, whole or not at all: for pictures and the like. A file that is
+/// Writes `bytes` to `path` as [`crate::Scan::write`] writes scans, whole or not at all: for pictures and the like. A file that is
 /// there is replaced.
 ///
 /// # Errors

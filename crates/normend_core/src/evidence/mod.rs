@@ -59,7 +59,7 @@ impl Known<'_> {
         !self.stations.is_empty() || self.track.is_some()
     }
 
-    /// Places to look at the cloud from, in the file's coordinates: all of a scanner that stood, and [`TRACK_PLACES`] along the way of one
+    /// Places to look at the cloud from, in the file's coordinates: all of a scanner that stood, and 64 along the way of one
     /// that moved.
     pub fn places(&self) -> Vec<DVec3> {
         let corners = self.track.map_or(&[][..], Track::corners);
